@@ -76,7 +76,10 @@ class Axis(Protocol):
         ...
 
     async def home(self) -> None:
-        """Find the axis's zero. Raises DeviceLostError, DeviceTimeoutError, MotionStoppedError, DeviceFaultError."""
+        """Find the axis's zero.
+
+        Raises DeviceLostError, DeviceTimeoutError, MotionStoppedError, DeviceFaultError.
+        """
         ...
 
     async def move(self, target: float) -> None:

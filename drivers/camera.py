@@ -49,7 +49,7 @@ class CameraSource(Protocol):
         """Return the newest frame whose exposure began at or after `after` (rig's clock, s), waiting for it.
 
         Without `after`, the newest frame there is. The same frame may be returned to several callers.
-        Raises DeviceLostError when the camera is gone and DeviceTimeoutError when no such frame comes in time.
+        Raises DeviceLostError when the camera is gone, DeviceTimeoutError when no such frame comes in time.
         """
         ...
 
