@@ -1,0 +1,202 @@
+"""The calibration: what is known of an active camera, as an immutable document.
+
+Axes and points are in the world frame at all readings 0, in metres; `scale` turns a reading into radians or
+metres. The screws, mounts and lenses are the result; D-H and base are views of them.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from calib.chain import Chain
+from calib.dh import link_transform
+from calib.documents import read_json, validate, write_json
+from calib.errors import CalibError
+from calib.session import Document, Intrinsics, JointKind, Number, Positive, RigidRows
+from calib.targets import Target
+
+CALIBRATION_FORMAT = "activecam.calibration/1"
+
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+
+
+class JointScrew(Document):
+    """A joint's axis as a screw in the world, at all readings 0."""
+
+    name: str
+    kind: JointKind
+    reading_unit: str
+    scale: Positive
+    scale_std: Number | None = None
+    axis: Triple
+    point: Triple
+
+
+class DhLink(Document):
+    """A row of the modified D-H model (eq 9 to 11): lengths in metres, angles in radians."""
+
+    a_prev: Number
+    alpha_prev: Number
+    d_offset: Number
+    theta_offset: Number
+    scale: Number
+
+
+class CalibratedCamera(Document):
+    """A camera on the chain: where it sits on its link, and its lens; null where it is not known."""
+
+    name: str
+    link: str | None
+    link_from_camera: RigidRows | None
+    intrinsics: Intrinsics | None
+    world_from_camera: RigidRows | None = None
+    """The pose at all readings 0, from which poses are computed: it stays exact where D-H frames run off."""
+
+
+class Covariance(Document):
+    """Covariance of this document's own numbers, named by their dotted paths."""
+
+    parameters: list[str]
+    matrix: list[list[Number]]
+
+
+class ViewQuality(Document):
+    """How well one view agrees with the calibration; null for what the view has no measure of."""
+
+    view: int
+    joint: str | None
+    use: Literal["fit", "verify"]
+    rms_px: Number | None = None
+    position_m: Number | None = None
+    rotation_rad: Number | None = None
+
+
+class Quality(Document):
+    """The residuals of the fit and of held-out views (px, rms over points), view by view, and warnings in words."""
+
+    rms_px: Number | None = None
+    held_out_rms_px: Number | None = None
+    views: list[ViewQuality] = []
+    warnings: list[str] = []
+
+
+class WorldOrigin(Document):
+    """Where the world's origin is seen at given readings: which way round a symmetric target is taken."""
+
+    camera: str
+    readings: list[Number]
+    pixel: Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class Calibration(Document):
+    """A calibrated active camera."""
+
+    format: Literal["activecam.calibration/1"]
+    method: Literal["ml", "closed_form"]
+    joints: list[JointScrew]
+    dh: list[DhLink]
+    world_from_base: RigidRows
+    cameras: Annotated[list[CalibratedCamera], Field(min_length=1)]
+    corrections: dict[str, Any] = {}
+    range: list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
+    covariance: Covariance | None = None
+    quality: Quality
+    target: Target | None = None
+    origin: WorldOrigin | None = None
+
+    @model_validator(mode="after")
+    def _sizes_agree(self) -> Self:
+        for field in ("dh", "range"):
+            if len(getattr(self, field)) != len(self.joints):
+                raise ValueError(f"{field}: has {len(getattr(self, field))} rows for {len(self.joints)} joints")
+        names = [joint.name for joint in self.joints]
+        for index, camera in enumerate(self.cameras):
+            if camera.link is not None and camera.link not in names:
+                raise ValueError(f"cameras[{index}].link: '{camera.link}' is not a joint of this calibration")
+        return self
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The joints as screws in the world."""
+        return Chain.of(
+            [joint.kind for joint in self.joints],
+            [joint.axis for joint in self.joints],
+            [joint.point for joint in self.joints],
+            [joint.scale for joint in self.joints],
+        )
+
+    def camera_index(self, name: str | None) -> int:
+        """Return the place of the camera called `name`, the first for None; raises CalibError naming those there are."""
+        names = [camera.name for camera in self.cameras]
+        if name is None:
+            return 0
+        if name not in names:
+            raise CalibError(f"there is no camera '{name}' in this calibration; it has {', '.join(names)}")
+        return names.index(name)
+
+    def world_from_camera(self, readings: ArrayLike, camera: str | None = None) -> NDArray[np.float64]:
+        """Return the camera's poses (n, 4, 4) at `readings` (n, m), or (4, 4) for one vector (m,).
+
+        Raises ReadingsError for readings of the wrong length, CalibError for a camera that has no mount.
+        """
+        index = self.camera_index(camera)
+        mount = self._mounts[index]
+        if mount is None:
+            raise CalibError(
+                f"this calibration knows the lens of camera '{self.cameras[index].name}' but not where it sits; "
+                "solve a session whose views have joint readings"
+            )
+        return self.chain.poses(readings, self._links[index], mount)
+
+    def base_from_world(self) -> NDArray[np.float64]:
+        """Return the base frame's inverse (4, 4)."""
+        return np.linalg.inv(np.array(self.world_from_base))
+
+    def out_of_range(self, readings: Sequence[float]) -> list[str]:
+        """Return the names of the joints whose reading lies beyond those seen in the fit."""
+        return [
+            joint.name
+            for joint, (low, high), reading in zip(self.joints, self.range, readings, strict=True)
+            if not low <= reading <= high
+        ]
+
+    @cached_property
+    def _links(self) -> list[int]:
+        names = [joint.name for joint in self.joints]
+        return [len(names) if camera.link is None else names.index(camera.link) + 1 for camera in self.cameras]
+
+    @cached_property
+    def _mounts(self) -> list[NDArray[np.float64] | None]:
+        """Each camera's pose at all readings 0 (4, 4)."""
+        return [
+            self._mount_on_link(camera, link)
+            if camera.world_from_camera is None
+            else np.array(camera.world_from_camera)
+            for camera, link in zip(self.cameras, self._links, strict=True)
+        ]
+
+    def _mount_on_link(self, camera: CalibratedCamera, link: int) -> NDArray[np.float64] | None:
+        if camera.link_from_camera is None:
+            return None
+        frame = np.array(self.world_from_base)
+        for joint, row in zip(self.joints[:link], self.dh, strict=False):
+            frame = frame @ link_transform(
+                joint.kind, row.a_prev, row.alpha_prev, row.d_offset, row.theta_offset, row.scale, 0.0
+            )
+        return frame @ np.array(camera.link_from_camera)
+
+
+def load_calibration(path: str | Path) -> Calibration:
+    """Read a calibration file; raises FormatError with a sentence that names the field."""
+    path = Path(path)
+    return validate(Calibration, read_json(path), str(path), CALIBRATION_FORMAT)
+
+
+def save_calibration(calibration: Calibration, path: str | Path) -> None:
+    """Write a calibration durably, so that a crash leaves either the new file or the old one."""
+    write_json(Path(path), calibration)

@@ -1,0 +1,258 @@
+"""The session: what was measured, as a folder that can be solved again offline for ever.
+
+`session.json` lists joints, cameras, target and views; pictures lie beside it. Units are SI except for
+readings, which are in each joint's own reading unit. Unknown keys are kept.
+"""
+
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    field_validator,
+    model_validator,
+)
+
+from calib.documents import read_json, validate
+from calib.errors import FormatError
+from calib.targets import Target, target_points
+
+SESSION_FORMAT = "activecam.session/1"
+
+JointKind = Literal["revolute", "prismatic"]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+def _rigid(rows: list[list[float]]) -> list[list[float]]:
+    matrix = np.array(rows, dtype=float) if all(len(row) == 4 for row in rows) else np.zeros((0, 0))
+    if matrix.shape != (4, 4) or not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
+        raise ValueError("must be a 4 x 4 matrix whose last row is 0 0 0 1")
+    rotation = matrix[:3, :3]
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
+        raise ValueError("must be a rigid transform: its upper left 3 x 3 part is not a rotation")
+    return rows
+
+
+RigidRows = Annotated[list[list[Number]], AfterValidator(_rigid)]
+
+
+class Document(BaseModel):
+    """A part of a file: unknown keys are kept, a known one must be right."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+
+class Intrinsics(Document):
+    """A camera's lens: `opencv` (k1 k2 p1 p2 k3) or `division` ([k1] on normalised coordinates)."""
+
+    model: Literal["opencv", "division"]
+    width: Annotated[int, Field(gt=0)] | None = None
+    height: Annotated[int, Field(gt=0)] | None = None
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    distortion: list[Number]
+
+    @model_validator(mode="after")
+    def _distortion_fits_model(self) -> Self:
+        wanted = {"opencv": 5, "division": 1}[self.model]
+        if len(self.distortion) != wanted:
+            raise ValueError(
+                f"distortion of the model '{self.model}' has {wanted} numbers, not {len(self.distortion)}"
+            )
+        return self
+
+
+class Joint(Document):
+    """A joint of the chain, in chain order."""
+
+    name: Annotated[str, Field(min_length=1)]
+    kind: JointKind
+    reading_unit: str
+    unit_trusted: bool = False
+    """Whether the encoder's own unit is to be believed as a measure to verify against."""
+
+
+class Camera(Document):
+    """A camera of the head; `link` is the joint it rides on, the last where not given."""
+
+    name: Annotated[str, Field(min_length=1)]
+    width: Annotated[int, Field(gt=0)] | None = None
+    height: Annotated[int, Field(gt=0)] | None = None
+    intrinsics: Intrinsics | None = None
+    link: str | None = None
+
+
+class Points(Document):
+    """Target points seen in a view: pictures of the points themselves, or the centroids of disks' pictures."""
+
+    ids: list[Annotated[int, Field(ge=0)]]
+    pixels: list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
+    disk: Literal["centroid"] | None = None
+
+    @model_validator(mode="after")
+    def _one_pixel_an_id(self) -> Self:
+        if len(self.ids) != len(self.pixels):
+            raise ValueError(f"has {len(self.ids)} ids but {len(self.pixels)} pixels; give one pixel for each id")
+        if len(set(self.ids)) != len(self.ids):
+            raise ValueError("an id stands in it twice")
+        return self
+
+
+class View(Document):
+    """One measurement: the readings, and a picture, its detected points, or a camera pose."""
+
+    joint: str | None
+    readings: list[Number]
+    image: str | None = None
+    points: Points | None = None
+    world_from_camera: RigidRows | None = None
+    camera: str | None = None
+    use: Literal["fit", "verify"] = "fit"
+    approached: list[Literal[-1, 0, 1]] | None = None
+    origin: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Pixel at which the world's origin is seen: which way round a symmetric target is taken."""
+
+    @field_validator("image")
+    @classmethod
+    def _inside_the_folder(cls, image: str | None) -> str | None:
+        if image is not None and (PurePosixPath(image).is_absolute() or ".." in PurePosixPath(image).parts):
+            raise ValueError(f"'{image}' must be a path inside the session's folder")
+        return image
+
+    @model_validator(mode="after")
+    def _one_measurement(self) -> Self:
+        given = [key for key in ("image", "points", "world_from_camera") if getattr(self, key) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none"
+            raise ValueError(f"must carry one of image, points or world_from_camera, and has {found}")
+        return self
+
+
+class DhRow(Document):
+    """A row of a nominal D-H model (m, rad); `theta` and `d` are offsets added to the scaled reading."""
+
+    a: Number
+    alpha: Number
+    d: Number
+    theta: Number
+    scale: Number = 1.0
+
+
+class NominalStd(Document):
+    """How well a nominal model is known: standard deviations of its lengths (m), angles (rad) and scales."""
+
+    length: Positive
+    angle: Positive
+    scale: Positive
+
+
+class Nominal(Document):
+    """A kinematic model from a drawing, to start from and as prior knowledge."""
+
+    convention: Literal["standard_dh", "modified_dh"]
+    dh: list[DhRow]
+    std: NominalStd
+
+
+class Session(Document):
+    """A session; `folder` is where its pictures are."""
+
+    format: Literal["activecam.session/1"]
+    joints: list[Joint]
+    cameras: Annotated[list[Camera], Field(min_length=1)]
+    target: Target
+    views: list[View]
+    nominal: Nominal | None = None
+
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the views' `image` paths start from."""
+        return self._folder
+
+    def at(self, folder: Path) -> Self:
+        """Return this session with its pictures in `folder`."""
+        placed = self.model_copy()
+        placed._folder = folder
+        return placed
+
+    def with_views(self, views: list[View]) -> Self:
+        """Return this session with other views."""
+        changed = self.model_copy(update={"views": views})
+        changed._folder = self._folder
+        return changed
+
+    def joint_index(self, name: str) -> int:
+        """Return the place in the chain of the joint called `name`."""
+        return [joint.name for joint in self.joints].index(name)
+
+    def camera_index(self, view: View) -> int:
+        """Return which camera took `view`."""
+        return 0 if view.camera is None else [camera.name for camera in self.cameras].index(view.camera)
+
+    def camera_link(self, camera: int) -> int:
+        """Return how many joints move `camera`: its link's place in the chain, counted from 1; 0 without joints."""
+        link = self.cameras[camera].link
+        return len(self.joints) if link is None else self.joint_index(link) + 1
+
+    def readings(self) -> NDArray[np.float64]:
+        """Return the readings of all views (n, m)."""
+        return np.array([view.readings for view in self.views], dtype=float).reshape(len(self.views), -1)
+
+    @model_validator(mode="after")
+    def _names_and_sizes_agree(self) -> Self:
+        joints = [joint.name for joint in self.joints]
+        cameras = [camera.name for camera in self.cameras]
+        for field, names in (("joints", joints), ("cameras", cameras)):
+            for name in names:
+                if names.count(name) > 1:
+                    raise ValueError(f"{field}: the name '{name}' stands twice")
+        for index, camera in enumerate(self.cameras):
+            if camera.link is not None and camera.link not in joints:
+                raise ValueError(f"cameras[{index}].link: '{camera.link}' is not a joint of this session")
+        if self.nominal is not None and len(self.nominal.dh) != len(joints):
+            raise ValueError(f"nominal.dh: has {len(self.nominal.dh)} rows for {len(joints)} joints")
+        points = len(target_points(self.target))
+        for index, view in enumerate(self.views):
+            problem = _problem_of_view(view, joints, cameras, points)
+            if problem:
+                raise ValueError(f"views[{index}].{problem}")
+        return self
+
+
+def _problem_of_view(view: View, joints: list[str], cameras: list[str], points: int) -> str | None:
+    if len(view.readings) != len(joints):
+        return f"readings: has {len(view.readings)} numbers for {len(joints)} joints"
+    if view.joint is not None and view.joint not in joints:
+        return f"joint: '{view.joint}' is not a joint of this session; its joints are {', '.join(joints) or 'none'}"
+    if view.camera is not None and view.camera not in cameras:
+        return f"camera: '{view.camera}' is not a camera of this session; its cameras are {', '.join(cameras)}"
+    if view.approached is not None and len(view.approached) != len(joints):
+        return f"approached: has {len(view.approached)} numbers for {len(joints)} joints"
+    if view.points is not None and view.points.ids and max(view.points.ids) >= points:
+        return f"points.ids: {max(view.points.ids)} is not a point of the target, which has {points}"
+    if view.image is not None and points == 0:
+        return "image: the target's kind is 'none', so a picture says nothing; give world_from_camera"
+    return None
+
+
+def load_session(path: str | Path) -> Session:
+    """Read a session from its folder, or from its `session.json`.
+
+    Raises FormatError with a sentence that names the field. A missing picture is found when it is needed.
+    """
+    path = Path(path)
+    file = path / "session.json" if path.is_dir() else path
+    if not file.exists() and not path.exists():
+        raise FormatError(f"{path}: there is no such session")
+    return validate(Session, read_json(file), str(file), SESSION_FORMAT).at(file.parent)

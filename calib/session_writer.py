@@ -1,0 +1,47 @@
+"""Writing a session view by view, so that a crash loses at most the view in flight."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.documents import write_durably, write_json
+from calib.errors import ImageError
+from calib.session import Session, View
+
+
+Picture = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+class SessionWriter:
+    """A session folder that grows; `session` is always what is on disk."""
+
+    def __init__(self, folder: Path, session: Session) -> None:
+        """Create `folder` and write `session`, whose pictures, if it has any, are already there."""
+        (folder / "frames").mkdir(parents=True, exist_ok=True)
+        self.folder = folder
+        self.session = session.at(folder)
+        write_json(folder / "session.json", self.session)
+
+    def add(self, view: View) -> View:
+        """Put one more view on disk, which carries its points or pose itself, and return it."""
+        grown = self.session.with_views([*self.session.views, view])
+        write_json(self.folder / "session.json", grown)
+        self.session = grown
+        return view
+
+    def add_picture(self, picture: Picture, **fields: Any) -> View:
+        """Put one more view on disk, `picture` first; `fields` are the view's keys beside `image`.
+
+        Raises ImageError for a picture that cannot be stored and OSError when the disk does not take it; the
+        session is then as it was.
+        """
+        name = f"frames/{len(self.session.views):04d}.png"
+        view = View(image=name, **fields)
+        done, data = cv2.imencode(".png", picture)
+        if not done:
+            raise ImageError(f"{self.folder / name}: the picture could not be encoded as PNG")
+        write_durably(self.folder / name, data.tobytes())
+        return self.add(view)
