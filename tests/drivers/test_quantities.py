@@ -15,6 +15,8 @@ numbers = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e12, max_
 class Plate(BaseModel):
     pitch: q.PositiveLength
     tilt: q.Angle = 0.0
+    point: tuple[q.Length, q.Length] | None = None
+    exposure: q.PositiveDuration | None = None
 
 
 @given(value=numbers, dimension=st.sampled_from(DIMENSIONS))
@@ -111,8 +113,16 @@ def test_an_axis_refuses_other_units_and_says_which_fit(text: str, unit: str, su
 def test_a_model_holds_si_and_writes_text() -> None:
     plate = Plate.model_validate({"pitch": "30 mm", "tilt": "90 deg"})
     assert plate.pitch == 0.03
-    assert plate.model_dump() == {"pitch": 0.03, "tilt": math.pi / 2}
-    assert plate.model_dump(mode="json") == {"pitch": "0.03 m", "tilt": f"{math.pi / 2!r} rad"}
+    assert plate.model_dump() == {"pitch": 0.03, "tilt": math.pi / 2, "point": None, "exposure": None}
+    written = plate.model_dump(mode="json", exclude_none=True)
+    assert written == {"pitch": "0.03 m", "tilt": f"{math.pi / 2!r} rad"}
+    assert Plate.model_validate_json(plate.model_dump_json()) == plate
+
+
+def test_quantities_may_be_optional_and_nested() -> None:
+    plate = Plate.model_validate({"pitch": "30 mm", "point": ["1 cm", "2 cm"], "exposure": "10 ms"})
+    assert plate.point == (0.01, 0.02)
+    assert plate.exposure == 0.01
     assert Plate.model_validate_json(plate.model_dump_json()) == plate
 
 
