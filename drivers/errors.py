@@ -6,6 +6,7 @@
     ├── DeviceTimeoutError (TimeoutError)  it is there but did not finish in time
     ├── LimitError (ValueError)            a target outside the axis's limits: nothing was moved
     ├── NotHomedError                      an absolute move of an axis whose position is unknown
+    ├── AxisBusyError                      a motion asked of an axis that is already moving
     ├── MotionError                        the axis stands, but not where it was sent
     ├── MotionStoppedError                 a stop ended the motion before its target
     └── DeviceFaultError                   the device reports a fault of its own, which a person must clear
@@ -36,6 +37,10 @@ class LimitError(DriverError, ValueError):
 
 class NotHomedError(DriverError):
     """The axis does not know where it is, so that only homing and jogging are allowed."""
+
+
+class AxisBusyError(DriverError):
+    """The axis is already moving; the motion under way goes on, and nothing was sent to the device."""
 
 
 class MotionError(DriverError):

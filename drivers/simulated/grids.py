@@ -1,0 +1,95 @@
+"""Targets without codes: disks and squares."""
+
+from typing import Literal
+
+import numpy as np
+
+from drivers.simulated.pattern import Box, Grid, Mask, Pattern, Points, Size, cells, grid
+
+
+class CircleGrid(Pattern):
+    """Black disks on a square grid; `pitch` apart."""
+
+    kind: Literal["circle_grid"]
+    pitch: Size
+    disk_diameter: Size
+
+    def points(self) -> Points:
+        """Return the disks' centres (n, 2)."""
+        return grid(self.rows, self.columns, self.pitch)
+
+    def box(self) -> Box:
+        """Return the extent of the ink."""
+        r = self.disk_diameter / 2
+        return -r, -r, (self.columns - 1) * self.pitch + r, (self.rows - 1) * self.pitch + r
+
+    def ink(self, x: Grid, y: Grid) -> Mask:
+        """Return where the disks are."""
+        return _disks(x, y, (self.rows, self.columns), self.pitch, self.disk_diameter)
+
+
+class AsymmetricCircleGrid(Pattern):
+    """Black disks; odd rows are shifted by half a pitch, and rows are half a pitch apart."""
+
+    kind: Literal["asymmetric_circle_grid"]
+    pitch: Size
+    """Spacing along a row's own disks."""
+    disk_diameter: Size
+
+    def points(self) -> Points:
+        """Return the disks' centres (n, 2)."""
+        row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
+        return np.column_stack([2 * column + row % 2, row]) * (self.pitch / 2)
+
+    def box(self) -> Box:
+        """Return the extent of the ink."""
+        r = self.disk_diameter / 2
+        right, bottom = self.points().max(axis=0) + r
+        return -r, -r, float(right), float(bottom)
+
+    def ink(self, x: Grid, y: Grid) -> Mask:
+        """Return where the disks are."""
+        # Even and odd rows are each a square grid of the full pitch.
+        ink = _disks(x, y, ((self.rows + 1) // 2, self.columns), self.pitch, self.disk_diameter)
+        if self.rows > 1:
+            half = self.pitch / 2
+            ink |= _disks(x - half, y - half, (self.rows // 2, self.columns), self.pitch, self.disk_diameter)
+        return ink
+
+
+class Chessboard(Pattern):
+    """Squares of side `pitch`; rows and columns count the inner corners. The top left square is black."""
+
+    kind: Literal["chessboard"]
+    pitch: Size
+
+    def points(self) -> Points:
+        """Return the inner corners (n, 2)."""
+        return grid(self.rows, self.columns, self.pitch)
+
+    def box(self) -> Box:
+        """Return the extent of the squares."""
+        return -self.pitch, -self.pitch, self.columns * self.pitch, self.rows * self.pitch
+
+    def ink(self, x: Grid, y: Grid) -> Mask:
+        """Return where the black squares are."""
+        column, row = cells(x, y, self.pitch)
+        inside = (column >= -1) & (column < self.columns) & (row >= -1) & (row < self.rows)
+        ink: Mask = inside & ((column + row) % 2 == 0)
+        return ink
+
+
+def _disks(x: Grid, y: Grid, shape: tuple[int, int], pitch: float, diameter: float) -> Mask:
+    rows, columns = shape
+    dx, dy = _offset(x, pitch, columns), _offset(y, pitch, rows)
+    inside: Mask = dx * dx + dy * dy < (diameter / 2) ** 2
+    return inside
+
+
+def _offset(values: Grid, pitch: float, count: int) -> Grid:
+    """Return the offsets of `values` from the nearest of `count` places that are `pitch` apart."""
+    index = np.rint(values * values.dtype.type(1 / pitch))
+    np.clip(index, 0, count - 1, out=index)
+    index *= -pitch
+    offset: Grid = index + values
+    return offset
