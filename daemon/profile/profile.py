@@ -1,0 +1,75 @@
+"""A rig as its profile describes it, checked: what the daemon is built from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from calib.session import SESSION_FORMAT, Session
+from calib.targets import Target
+from daemon.profile.axes import AxisProfile
+from daemon.profile.devices import CameraProfile, ControllerProfile
+from daemon.profile.procedure import Procedure
+from drivers.simulated.options import SimulationOptions
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Axes, camera and target of one rig, and the procedure that calibrates it.
+
+    Whatever concerns an axis is in its reading unit; everything else is in SI, pixels for pictures.
+    """
+
+    format: str
+    name: str
+    description: str
+    axes: tuple[AxisProfile, ...]
+    """In chain order, the base first."""
+    controllers: Mapping[str, ControllerProfile]
+    camera: CameraProfile
+    target: Target
+    procedure: Procedure
+    simulation: SimulationOptions | None
+    """What is true of a simulated rig, for its drivers only; None where the devices are real."""
+    source: Path | None
+    """The file that it was read from."""
+
+    def empty_session(self) -> Session:
+        """Return the session of a run that has not taken a picture yet.
+
+        Its key `complete` is false, and becomes true when a run has ended as planned.
+        """
+        return Session.model_validate(
+            {
+                "format": SESSION_FORMAT,
+                "complete": False,
+                "profile": self.name,
+                "joints": [_joint(axis) for axis in self.axes],
+                "cameras": [_camera(self.camera)],
+                "target": self.target.model_dump(exclude_unset=True),
+                "views": [],
+            }
+        )
+
+
+def _joint(axis: AxisProfile) -> dict[str, Any]:
+    joint = {
+        "name": axis.spec.name,
+        "kind": axis.spec.kind,
+        "reading_unit": axis.spec.unit,
+        "unit_trusted": axis.unit_trusted,
+    }
+    return joint if axis.reading_std is None else joint | {"reading_std": axis.reading_std}
+
+
+def _camera(camera: CameraProfile) -> dict[str, Any]:
+    known: dict[str, Any] = {
+        "name": camera.spec.name,
+        "width": camera.spec.width,
+        "height": camera.spec.height,
+    }
+    if camera.link is not None:
+        known["link"] = camera.link
+    if camera.intrinsics is not None:
+        known["intrinsics"] = camera.intrinsics.model_dump(exclude_unset=True)
+    return known
