@@ -69,7 +69,7 @@ class SimulatedCamera:
         return self._spec
 
     async def open(self) -> None:
-        """Start the stream. Raises DeviceLostError while the camera is unplugged, OptionsError for its lens."""
+        """Start the stream. Raises DeviceLostError while unplugged, OptionsError for its lens."""
         if self._fault == "lost":
             raise self._gone()
         await asyncio.to_thread(self._exposure.prepare)

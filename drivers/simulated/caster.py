@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.simulated.plate import BACKGROUND, Plate
+from drivers.simulated.plate import Plate
 
 Array = NDArray[np.float64]
 Rays = NDArray[np.float32]
@@ -22,8 +22,8 @@ class Caster:
         self._turn = world_from_camera[:3, :3].astype(np.float32)
         self._x, self._y, self._z = (float(value) for value in world_from_camera[:3, 3])
 
-    def surface(self, x: Rays, y: Rays) -> NDArray[np.uint8]:
-        """Return what the camera's rays (x, y, 1) meet: INK, PAPER or BACKGROUND, in their shape."""
+    def depths(self, x: Rays, y: Rays) -> tuple[Rays, Rays]:
+        """Return how deep the camera's rays (x, y, 1) meet the ink and the paper (m), in their shape."""
         (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._turn
         dz = zx * x + zy * y + zz
         in_front = self._z < 0.0
@@ -39,9 +39,11 @@ class Caster:
         far = np.float32(_FAR)
         np.clip(at_x, -far, far, out=at_x)
         np.clip(at_y, -far, far, out=at_y)
-        met = self._plate.surface(at_x, at_y, front=in_front)
-        met[~towards] = BACKGROUND
-        return met
+        at_x[~towards] = far
+        paper = self._plate.paper_depth(at_x, at_y)
+        if not in_front:
+            return np.full_like(paper, -far), paper  # the back of the plate is blank
+        return self._plate.ink_depth(at_x, at_y), paper
 
     def _on_bulge(self, x: Rays, y: Rays, slope_x: Rays, slope_y: Rays) -> tuple[Rays, Rays]:
         """Return x and y where rays that meet the plane at x, y meet the paper that stands out of it."""

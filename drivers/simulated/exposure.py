@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.simulated.renderer import SAMPLES, Renderer
+from drivers.simulated.renderer import Renderer
 from drivers.simulated.sensor import Sensor
 from drivers.simulated.world import SimulatedWorld
 
@@ -29,7 +29,7 @@ class Exposure:
         self._still: tuple[bytes, Grey] | None = None
 
     def prepare(self) -> None:
-        """Do now what the first picture would be late for. Raises OptionsError where the lens cannot fill it."""
+        """Do what the first picture would be late for. Raises OptionsError for a lens without inverse."""
         self._renderer.prepare()
 
     def poses(self, begins: float, duration: float) -> list[Array]:
@@ -53,10 +53,9 @@ class Exposure:
         key = np.stack(poses).tobytes()
         # A camera that stands sees the same picture again and again, but for the noise.
         if self._still is None or self._still[0] != key:
-            samples = max(8, SAMPLES // len(poses))
-            light = self._renderer.render(poses[0], SAMPLES if len(poses) == 1 else samples)
+            light = self._renderer.render(poses[0])
             for pose in poses[1:]:
-                light += self._renderer.render(pose, samples)
+                light += self._renderer.render(pose)
             light /= np.float32(len(poses))
             self._still = key, self._sensor.gather(light)
         return self._still[1]

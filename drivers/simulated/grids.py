@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from drivers.simulated.pattern import Box, Grid, Mask, Pattern, Points, Size, cells, grid
+from drivers.simulated.pattern import Box, Grid, Pattern, Points, Size, box_depth, cells, grid
 
 
 class CircleGrid(Pattern):
@@ -23,8 +23,8 @@ class CircleGrid(Pattern):
         r = self.disk_diameter / 2
         return -r, -r, (self.columns - 1) * self.pitch + r, (self.rows - 1) * self.pitch + r
 
-    def ink(self, x: Grid, y: Grid) -> Mask:
-        """Return where the disks are."""
+    def depth(self, x: Grid, y: Grid) -> Grid:
+        """Return the depth in the disks."""
         return _disks(x, y, (self.rows, self.columns), self.pitch, self.disk_diameter)
 
 
@@ -47,14 +47,16 @@ class AsymmetricCircleGrid(Pattern):
         right, bottom = self.points().max(axis=0) + r
         return -r, -r, float(right), float(bottom)
 
-    def ink(self, x: Grid, y: Grid) -> Mask:
-        """Return where the disks are."""
+    def depth(self, x: Grid, y: Grid) -> Grid:
+        """Return the depth in the disks."""
         # Even and odd rows are each a square grid of the full pitch.
-        ink = _disks(x, y, ((self.rows + 1) // 2, self.columns), self.pitch, self.disk_diameter)
-        if self.rows > 1:
-            half = self.pitch / 2
-            ink |= _disks(x - half, y - half, (self.rows // 2, self.columns), self.pitch, self.disk_diameter)
-        return ink
+        even = _disks(x, y, ((self.rows + 1) // 2, self.columns), self.pitch, self.disk_diameter)
+        if self.rows == 1:
+            return even
+        half = self.pitch / 2
+        odd = _disks(x - half, y - half, (self.rows // 2, self.columns), self.pitch, self.disk_diameter)
+        deeper: Grid = np.maximum(even, odd)
+        return deeper
 
 
 class Chessboard(Pattern):
@@ -71,19 +73,18 @@ class Chessboard(Pattern):
         """Return the extent of the squares."""
         return -self.pitch, -self.pitch, self.columns * self.pitch, self.rows * self.pitch
 
-    def ink(self, x: Grid, y: Grid) -> Mask:
-        """Return where the black squares are."""
-        column, row = cells(x, y, self.pitch)
-        inside = (column >= -1) & (column < self.columns) & (row >= -1) & (row < self.rows)
-        ink: Mask = inside & ((column + row) % 2 == 0)
-        return ink
+    def depth(self, x: Grid, y: Grid) -> Grid:
+        """Return the depth in the black squares."""
+        column, row, inset = cells(x, y, self.pitch)
+        depth: Grid = np.where((column + row) % 2 == 0, inset, -inset)
+        return np.minimum(depth, box_depth(x, y, self.box()))
 
 
-def _disks(x: Grid, y: Grid, shape: tuple[int, int], pitch: float, diameter: float) -> Mask:
+def _disks(x: Grid, y: Grid, shape: tuple[int, int], pitch: float, diameter: float) -> Grid:
     rows, columns = shape
     dx, dy = _offset(x, pitch, columns), _offset(y, pitch, rows)
-    inside: Mask = dx * dx + dy * dy < (diameter / 2) ** 2
-    return inside
+    depth: Grid = diameter / 2 - np.sqrt(dx * dx + dy * dy)
+    return depth
 
 
 def _offset(values: Grid, pitch: float, count: int) -> Grid:

@@ -1,4 +1,4 @@
-"""What every printed pattern has: its points, their ids, and its ink.
+"""What every printed pattern has: its points, and its ink as a signed distance.
 
 Plate coordinates (m): origin at the first point (row 0, column 0), x along columns, y along rows, as in the
 world.
@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Grid = NDArray[Any]
 """Floats of any shape and precision: rendering works in 32 bits, which are 1e-4 px on a plate."""
-Mask = NDArray[np.bool_]
 Points = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """x and y of the top left, x and y of the bottom right."""
@@ -39,8 +38,11 @@ class Pattern(BaseModel, ABC):
         """Return the extent of the pattern, to which the paper's margin is added."""
 
     @abstractmethod
-    def ink(self, x: Grid, y: Grid) -> Mask:
-        """Return where the print is black, for arrays of any one shape."""
+    def depth(self, x: Grid, y: Grid) -> Grid:
+        """Return how deep in the ink places are (m): the distance to its edge, negative outside.
+
+        It is exact to either side of an edge; far from edges only its sign counts. x and y are of one shape.
+        """
 
 
 def grid(rows: int, columns: int, pitch: float) -> Points:
@@ -49,7 +51,19 @@ def grid(rows: int, columns: int, pitch: float) -> Points:
     return np.column_stack([column * pitch, row * pitch])
 
 
-def cells(x: Grid, y: Grid, pitch: float) -> tuple[Grid, Grid]:
-    """Return the integer column and row of the square cells of side `pitch` that the places lie in."""
-    scale = 1 / pitch
-    return np.floor(x * scale).astype(np.int32), np.floor(y * scale).astype(np.int32)
+def cells(x: Grid, y: Grid, side: float) -> tuple[Grid, Grid, Grid]:
+    """Return the columns and rows of the square cells that places lie in, and how deep in them they are."""
+    scale = 1 / side
+    u, v = x * scale, y * scale
+    column, row = np.floor(u), np.floor(v)
+    u -= column + 0.5
+    v -= row + 0.5
+    inset = (0.5 - np.maximum(np.abs(u), np.abs(v))) * side
+    return column.astype(np.int32), row.astype(np.int32), inset
+
+
+def box_depth(x: Grid, y: Grid, box: Box) -> Grid:
+    """Return how deep in a box places are (m), negative outside."""
+    left, top, right, bottom = box
+    depth: Grid = np.minimum(np.minimum(x - left, right - x), np.minimum(y - top, bottom - y))
+    return depth

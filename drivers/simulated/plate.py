@@ -6,11 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.simulated.options import PlateOptions
-from drivers.simulated.pattern import Grid
+from drivers.simulated.pattern import Box, Grid, box_depth
 from drivers.simulated.target import Target
-
-INK, PAPER, BACKGROUND = 0, 1, 2
-"""What a ray meets."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +18,7 @@ class Plate:
     options: PlateOptions
 
     @property
-    def box(self) -> tuple[float, float, float, float]:
+    def box(self) -> Box:
         """The paper's extent in the world: x and y of the top left, x and y of the bottom right (m)."""
         left, top, right, bottom = self.target.box()
         margin, scale = self.options.margin, self.options.print_scale
@@ -59,12 +56,12 @@ class Plate:
         ]
         return np.concatenate([np.column_stack([u, v, np.zeros_like(s)]) for u, v in edges])
 
-    def surface(self, x: Grid, y: Grid, front: bool) -> NDArray[np.uint8]:
-        """Return INK, PAPER or BACKGROUND at places x, y of the plane; the paper's back is blank."""
-        left, top, right, bottom = self.box
-        paper = (x > left) & (x < right) & (y > top) & (y < bottom)
-        met = np.where(paper, np.uint8(PAPER), np.uint8(BACKGROUND))
-        if front:
-            scale = 1 / self.options.print_scale
-            met[self.target.ink(x * scale, y * scale)] = INK
-        return met
+    def paper_depth(self, x: Grid, y: Grid) -> Grid:
+        """Return how far within the paper's edges places of the plane are (m), negative outside."""
+        return box_depth(x, y, self.box)
+
+    def ink_depth(self, x: Grid, y: Grid) -> Grid:
+        """Return how deep in the ink places of the plane are (m), negative outside."""
+        scale = self.options.print_scale
+        depth: Grid = self.target.depth(x * (1 / scale), y * (1 / scale)) * scale
+        return depth

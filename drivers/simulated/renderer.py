@@ -1,7 +1,7 @@
 """What the light draws on the sensor: each pixel's ray cast to the plate, averaged over its square.
 
-A pixel that sees one kind of surface needs one ray; one with an edge in it is averaged over many. So edges
-lie where the geometry puts them, and disk centres and corners measured in such a picture agree with it.
+A pixel without an edge needs one ray. One that a straight edge crosses has its exact share of either side,
+and one with a corner is sampled. So edges lie where the geometry puts them, to a thousandth of a pixel.
 """
 
 from dataclasses import dataclass
@@ -11,28 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.simulated.caster import Caster
+from drivers.simulated.coverage import CORNERS, share, spread
 from drivers.simulated.lens import Lens, RayField, ray_field
-from drivers.simulated.plate import BACKGROUND, INK, Plate
+from drivers.simulated.plate import Plate
 
 Array = NDArray[np.float64]
 Grey = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-SAMPLES = 32
-"""Rays in a pixel that sees an edge."""
-_CHUNK = 4096
-"""Pixels averaged at a time, so that their samples stay in the processor's cache."""
+_SAMPLES = 256
+"""Rays in a pixel that has a corner of the pattern in it."""
+_BATCH = 512
+"""Such pixels sampled at a time, so that their rays stay in the processor's cache."""
 _BACKGROUND_STEP = 16
 """Pixels between the places where the smooth background is computed."""
-
-
-def sample_offsets(count: int) -> Grey:
-    """Return places (count, 2) within a pixel, evenly spread and point-symmetric about its centre."""
-    # The additive recurrence of the plastic number: no two samples share a row or a column, so that edges
-    # along the pixel grid are averaged as finely as slanted ones. Symmetry keeps their mean at the centre.
-    index = np.arange(1, count // 2 + 1)
-    half = np.column_stack([index * 0.7548776662466927, index * 0.5698402909980532]) % 1.0 - 0.5
-    return np.concatenate([half, -half]).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -45,10 +37,10 @@ class Renderer:
     height: int
 
     def prepare(self) -> None:
-        """Invert the lens, which takes longer than many pictures. Raises OptionsError where it has no inverse."""
+        """Invert the lens, which takes as long as many pictures. Raises OptionsError where that fails."""
         ray_field(self.lens, self.width, self.height)
 
-    def render(self, world_from_camera: Array, samples: int = SAMPLES) -> Grey:
+    def render(self, world_from_camera: Array) -> Grey:
         """Return what a camera of this pose (4, 4) sees in an instant, free of blur and noise."""
         rays = ray_field(self.lens, self.width, self.height)
         picture = self._background(rays, world_from_camera)
@@ -56,24 +48,16 @@ class Renderer:
         if left >= right or top >= bottom:
             return picture
         caster = Caster(self.plate, world_from_camera)
-        inside = (slice(top + 1, bottom + 1), slice(left + 1, right + 1))
-        met = caster.surface(rays.x[inside], rays.y[inside])
-
-        # Shares of ink and of background in each pixel; the rest is paper.
-        ink, behind = (met == INK).astype(np.float32), (met == BACKGROUND).astype(np.float32)
-        rows, columns = np.nonzero(_mixed(met))
-        offsets = sample_offsets(samples)
-        for first in range(0, len(rows), _CHUNK):
-            r, c = rows[first : first + _CHUNK], columns[first : first + _CHUNK]
-            seen = caster.surface(*_rays_within(rays, r + top + 1, c + left + 1, offsets))
-            ink[r, c] = np.mean(seen == INK, axis=1, dtype=np.float32)
-            behind[r, c] = np.mean(seen == BACKGROUND, axis=1, dtype=np.float32)
+        seen = (slice(top + 1, bottom + 1), slice(left + 1, right + 1))
+        depths = caster.depths(rays.x[seen], rays.y[seen])
+        ink, paper = (np.greater(depth, 0).astype(np.float32) for depth in depths)
+        rows, columns = np.nonzero(_on_edges(ink + paper))
+        pixels = (rows + top + 1, columns + left + 1)
+        ink[rows, columns], paper[rows, columns] = _shares(caster, rays, pixels)
 
         tones = self.plate.options
         view = picture[top:bottom, left:right]
-        view -= np.float32(tones.paper)
-        view *= behind
-        view += np.float32(tones.paper)
+        view += paper * (np.float32(tones.paper) - view)
         view += ink * np.float32(tones.ink - tones.paper)
         return picture
 
@@ -98,20 +82,34 @@ class Renderer:
         return np.asarray(cv2.resize(grey, (self.width, self.height)), np.float32)
 
 
-def _mixed(met: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def _on_edges(met: Grey) -> NDArray[np.bool_]:
     """Return which pixels may have an edge in them: those that differ from a neighbour."""
     square = np.ones((3, 3), np.uint8)
     mixed: NDArray[np.bool_] = cv2.dilate(met, square) != cv2.erode(met, square)
     return mixed
 
 
-def _rays_within(rays: RayField, rows: Indices, columns: Indices, offsets: Grey) -> list[Grey]:
-    """Return x and y (n, s) of the rays at `offsets` (s, 2) in n pixels, within which the field is linear."""
+def _shares(caster: Caster, rays: RayField, pixels: tuple[Indices, Indices]) -> tuple[Grey, Grey]:
+    """Return the shares of ink and of paper (n,) in the squares of n pixels (rows and columns in `rays`)."""
+    depths = caster.depths(*_rays_within(rays, pixels, CORNERS))
+    (ink, ink_doubtful), (paper, paper_doubtful) = (share(depth) for depth in depths)
+    doubtful = np.flatnonzero(ink_doubtful | paper_doubtful)
+    everywhere = spread(_SAMPLES)
+    for first in range(0, len(doubtful), _BATCH):
+        some = doubtful[first : first + _BATCH]
+        sampled = caster.depths(*_rays_within(rays, (pixels[0][some], pixels[1][some]), everywhere))
+        ink[some], paper[some] = (np.mean(depth > 0, axis=1, dtype=np.float32) for depth in sampled)
+    return ink, paper
+
+
+def _rays_within(rays: RayField, pixels: tuple[Indices, Indices], offsets: Grey) -> list[Grey]:
+    """Return x and y (n, s) of rays at offsets (s, 2) from n pixels, within which the field is linear."""
+    row, column = pixels
     within = []
     for field in (rays.x, rays.y):
-        along_u = (field[rows, columns + 1] - field[rows, columns - 1]) * np.float32(0.5)
-        along_v = (field[rows + 1, columns] - field[rows - 1, columns]) * np.float32(0.5)
+        along_u = (field[row, column + 1] - field[row, column - 1]) * np.float32(0.5)
+        along_v = (field[row + 1, column] - field[row - 1, column]) * np.float32(0.5)
         ray = np.stack([along_u, along_v], axis=1) @ offsets.T
-        ray += field[rows, columns][:, None]
+        ray += field[row, column][:, None]
         within.append(ray)
     return within

@@ -4,9 +4,12 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.errors import OptionsError
-from drivers.simulated.pattern import Box, Grid, Mask, Pattern, Points, Size, cells, grid
+from drivers.simulated.pattern import Box, Grid, Pattern, Points, Size, box_depth, cells, grid
+
+Bits = NDArray[np.bool_]
 
 
 class Charuco(Pattern):
@@ -34,24 +37,22 @@ class Charuco(Pattern):
         """Return the extent of the squares."""
         return -self.pitch, -self.pitch, (self.columns - 1) * self.pitch, (self.rows - 1) * self.pitch
 
-    def ink(self, x: Grid, y: Grid) -> Mask:
-        """Return where squares and markers are black."""
+    def depth(self, x: Grid, y: Grid) -> Grid:
+        """Return the depth in squares and markers."""
         u, v = x + self.pitch, y + self.pitch  # from the board's top left
-        column, row = cells(u, v, self.pitch)
-        inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        black = (column + row) % 2 == 0
+        column, row, inset = cells(u, v, self.pitch)
         # Markers are numbered along the white squares, row by row.
-        white_before = (np.arange(self.rows) * self.columns) // 2
+        markers_above = (np.arange(self.rows) * self.columns) // 2
         first_white = (np.arange(self.rows) + 1) % 2
         r = np.clip(row, 0, self.rows - 1)
-        number = white_before[r] + (column - first_white[r]) // 2
-        bits = marker_bits(self.dictionary, self.marker_count())
+        number = markers_above[r] + (column - first_white[r]) // 2
         edge = (self.pitch - self.marker) / 2
-        drawn = black_in_marker(
-            bits, number, u - column * self.pitch - edge, v - row * self.pitch - edge, self.marker
-        )
-        ink: Mask = inside & (black | drawn)
-        return ink
+        bits = marker_bits(self.dictionary, self.marker_count())
+        from_left, from_top = u - column * self.pitch - edge, v - row * self.pitch - edge
+        in_marker = marker_depth(bits, number, from_left, from_top, self.marker)
+        in_white = np.maximum(in_marker, -inset)
+        depth: Grid = np.where((column + row) % 2 == 0, inset, in_white)
+        return np.minimum(depth, box_depth(x, y, self.box()))
 
 
 class AprilGrid(Pattern):
@@ -86,18 +87,19 @@ class AprilGrid(Pattern):
         step = self.tag + self.spacing
         return 0.0, 0.0, self.columns * step - self.spacing, self.rows * step - self.spacing
 
-    def ink(self, x: Grid, y: Grid) -> Mask:
-        """Return where the tags are black."""
+    def depth(self, x: Grid, y: Grid) -> Grid:
+        """Return the depth in the tags' black cells."""
         step = self.tag + self.spacing
-        column, row = cells(x, y, step)
-        inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        number = row * self.columns + column
+        # Cells with half of the white around a tag on each side.
+        u, v = x + self.spacing / 2, y + self.spacing / 2
+        column, row, _ = cells(u, v, step)
+        c, r = np.clip(column, 0, self.columns - 1), np.clip(row, 0, self.rows - 1)
         bits = marker_bits(self.dictionary, self.marker_count())
-        return inside & black_in_marker(bits, number, x - column * step, y - row * step, self.tag)
+        return marker_depth(bits, r * self.columns + c, x - c * step, y - r * step, self.tag)
 
 
 @lru_cache(maxsize=8)
-def marker_bits(dictionary: str, count: int) -> Mask:
+def marker_bits(dictionary: str, count: int) -> Bits:
     """Return the cells (count, n, n) of markers 0, 1, ... with their black border, True where black.
 
     Raises OptionsError where OpenCV has no such dictionary or it has fewer markers.
@@ -120,11 +122,14 @@ def marker_bits(dictionary: str, count: int) -> Mask:
     return np.asarray(np.array(drawn) == 0)
 
 
-def black_in_marker(bits: Mask, number: Grid, x: Grid, y: Grid, side: float) -> Mask:
-    """Return where places x, y from the top left of the markers `number` of this side are black."""
+def marker_depth(bits: Bits, number: Grid, x: Grid, y: Grid, side: float) -> Grid:
+    """Return the depth (m) in the black cells of markers; x, y are from their top left.
+
+    Outside of the marker it is the distance to the marker, negative.
+    """
     count, n, _ = bits.shape
-    column, row = cells(x, y, side / n)
-    inside = (column >= 0) & (column < n) & (row >= 0) & (row < n)
+    column, row, inset = cells(x, y, side / n)
     index = (np.clip(number, 0, count - 1) * n + np.clip(row, 0, n - 1)) * n + np.clip(column, 0, n - 1)
-    black: Mask = inside & bits.ravel()[index]
-    return black
+    depth: Grid = np.where(bits.ravel()[index], inset, -inset)
+    around = box_depth(x, y, (0.0, 0.0, side, side))
+    return np.where(around > 0.0, depth, around)
