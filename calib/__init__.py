@@ -1,1 +1,41 @@
-"""The mathematics of an active camera's calibration, and its two file formats."""
+"""The mathematics of an active camera's calibration, and its two file formats.
+
+    session = load_session("sessions/monday")
+    calibration = solve(session)
+    calibration.world_from_camera([12.5, 30.0])     # 4 x 4
+
+`solve` and `verify` are loaded when first used: who only asks for poses does not wait for the solver.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from calib.calibration import Calibration, load_calibration, save_calibration
+from calib.errors import CalibError
+from calib.session import Session, View, load_session
+
+if TYPE_CHECKING:
+    from calib.solver import solve
+    from calib.verification import Verification, verify
+
+__all__ = [
+    "CalibError",
+    "Calibration",
+    "Session",
+    "Verification",
+    "View",
+    "load_calibration",
+    "load_session",
+    "save_calibration",
+    "solve",
+    "verify",
+]
+
+_LAZY = {"Verification": "calib.verification", "solve": "calib.solver", "verify": "calib.verification"}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        from importlib import import_module
+
+        return getattr(import_module(_LAZY[name]), name)
+    raise AttributeError(f"module 'calib' has no attribute {name!r}")

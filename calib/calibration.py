@@ -17,8 +17,16 @@ from calib.chain import Chain
 from calib.dh import link_transform
 from calib.documents import read_json, validate, write_json
 from calib.errors import CalibError
-from calib.session import Document, Intrinsics, JointKind, Number, Positive, RigidRows
-from calib.targets import Target
+from calib.session import (
+    Document,
+    Intrinsics,
+    JointKind,
+    Number,
+    Positive,
+    RigidRows,
+    StoredTarget,
+    WorldOrigin,
+)
 
 CALIBRATION_FORMAT = "activecam.calibration/1"
 
@@ -77,20 +85,12 @@ class ViewQuality(Document):
 
 
 class Quality(Document):
-    """The residuals of the fit and of held-out views (px, rms over points), view by view, and warnings in words."""
+    """Residuals of fit and held-out views (px, rms over points), view by view, and warnings in words."""
 
     rms_px: Number | None = None
     held_out_rms_px: Number | None = None
-    views: list[ViewQuality] = []
-    warnings: list[str] = []
-
-
-class WorldOrigin(Document):
-    """Where the world's origin is seen at given readings: which way round a symmetric target is taken."""
-
-    camera: str
-    readings: list[Number]
-    pixel: Annotated[list[Number], Field(min_length=2, max_length=2)]
+    views: list[ViewQuality] = Field(default_factory=list)
+    warnings: list[str] = Field(default_factory=list)
 
 
 class Calibration(Document):
@@ -102,18 +102,20 @@ class Calibration(Document):
     dh: list[DhLink]
     world_from_base: RigidRows
     cameras: Annotated[list[CalibratedCamera], Field(min_length=1)]
-    corrections: dict[str, Any] = {}
+    corrections: dict[str, Any] = Field(default_factory=dict)
     range: list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
     covariance: Covariance | None = None
     quality: Quality
-    target: Target | None = None
+    target: StoredTarget | None = None
     origin: WorldOrigin | None = None
 
     @model_validator(mode="after")
     def _sizes_agree(self) -> Self:
         for field in ("dh", "range"):
             if len(getattr(self, field)) != len(self.joints):
-                raise ValueError(f"{field}: has {len(getattr(self, field))} rows for {len(self.joints)} joints")
+                raise ValueError(
+                    f"{field}: has {len(getattr(self, field))} rows for {len(self.joints)} joints"
+                )
         names = [joint.name for joint in self.joints]
         for index, camera in enumerate(self.cameras):
             if camera.link is not None and camera.link not in names:
@@ -131,7 +133,7 @@ class Calibration(Document):
         )
 
     def camera_index(self, name: str | None) -> int:
-        """Return the place of the camera called `name`, the first for None; raises CalibError naming those there are."""
+        """Return the place of the camera `name`, of the first for None; raises CalibError for no such one."""
         names = [camera.name for camera in self.cameras]
         if name is None:
             return 0
@@ -148,7 +150,7 @@ class Calibration(Document):
         mount = self._mounts[index]
         if mount is None:
             raise CalibError(
-                f"this calibration knows the lens of camera '{self.cameras[index].name}' but not where it sits; "
+                f"the lens of camera '{self.cameras[index].name}' is calibrated, but not where it sits; "
                 "solve a session whose views have joint readings"
             )
         return self.chain.poses(readings, self._links[index], mount)
@@ -168,7 +170,9 @@ class Calibration(Document):
     @cached_property
     def _links(self) -> list[int]:
         names = [joint.name for joint in self.joints]
-        return [len(names) if camera.link is None else names.index(camera.link) + 1 for camera in self.cameras]
+        return [
+            len(names) if camera.link is None else names.index(camera.link) + 1 for camera in self.cameras
+        ]
 
     @cached_property
     def _mounts(self) -> list[NDArray[np.float64] | None]:
@@ -176,7 +180,7 @@ class Calibration(Document):
         return [
             self._mount_on_link(camera, link)
             if camera.world_from_camera is None
-            else np.array(camera.world_from_camera)
+            else np.array(camera.world_from_camera, dtype=float)
             for camera, link in zip(self.cameras, self._links, strict=True)
         ]
 
@@ -188,7 +192,7 @@ class Calibration(Document):
             frame = frame @ link_transform(
                 joint.kind, row.a_prev, row.alpha_prev, row.d_offset, row.theta_offset, row.scale, 0.0
             )
-        return frame @ np.array(camera.link_from_camera)
+        return np.asarray(frame @ np.array(camera.link_from_camera))
 
 
 def load_calibration(path: str | Path) -> Calibration:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Joints in chain order: `revolute` (m,), `axes` (m, 3) of unit length, `points` (m, 3) in m, `scales` (m,)."""
+    """Joints in chain order: `revolute` (m,), unit `axes` (m, 3), `points` (m, 3) in m, `scales` (m,)."""
 
     revolute: NDArray[np.bool_]
     axes: Array
@@ -70,7 +70,7 @@ class Chain:
         return motion
 
     def displacement(self, readings: ArrayLike, joints: int | None = None) -> Array:
-        """Return what moves everything on the first `joints` joints (all by default) from readings 0 to `readings`.
+        """Return what moves all that rides on the first `joints` joints (all by default) from readings 0.
 
         (n, 4, 4) for readings (n, m), (4, 4) for one vector (m,). Raises ReadingsError for a wrong length.
         """
@@ -79,12 +79,14 @@ class Chain:
         values = np.atleast_2d(values)
         if values.ndim != 2 or values.shape[1] != len(self) or not np.all(np.isfinite(values)):
             got = "not all finite numbers" if values.shape[-1] == len(self) else f"{values.shape[-1]} numbers"
-            raise ReadingsError(f"readings must be one finite number for each of the {len(self)} joints, not {got}")
+            raise ReadingsError(
+                f"readings must be one finite number for each of the {len(self)} joints, not {got}"
+            )
         result = np.broadcast_to(np.eye(4), (len(values), 4, 4))
         for joint in range(len(self) if joints is None else joints):
             result = result @ self.motion(joint, values[:, joint])
         return result[0] if single else result
 
     def poses(self, readings: ArrayLike, joints: int, mount: Array) -> Array:
-        """Return `displacement(readings, joints) @ mount`: the poses of what stands at `mount` (4, 4) at readings 0."""
+        """Return the poses at `readings` of what stands at `mount` (4, 4) at readings 0."""
         return self.displacement(readings, joints) @ mount

@@ -1,4 +1,4 @@
-"""The modified (Craig) Denavit-Hartenberg link with a scale and a zero-offset per joint (eq 9 to 11). numpy alone."""
+"""The modified (Craig) Denavit-Hartenberg link with a scale and zero-offset per joint (eq 9 to 11)."""
 
 from math import cos, sin
 

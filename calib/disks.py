@@ -1,7 +1,7 @@
 """Where a disk is seen: the centroid of its picture, which is not the picture of its centre.
 
-A tilted disk's nearer half looks larger, and the lens bends it besides. The solver's residual adds this offset to
-the predicted centre, here and nowhere else; detectors report centroids as they are.
+A tilted disk's nearer half looks larger, and the lens bends it besides. The solver's residual adds this
+offset to the predicted centre, here and nowhere else; detectors report centroids as they are.
 """
 
 import numpy as np
@@ -30,7 +30,8 @@ def centroid_offsets(centres: Array, camera_from_world: Array, diameter: float, 
     slope = np.einsum("ij,njk->nik", _fourier_derivative(RIM_POINTS), seen)
     x, y, dx, dy = seen[..., 0], seen[..., 1], slope[..., 0], slope[..., 1]
     area = (x * dy - y * dx).sum(axis=1)
-    return np.column_stack([(x * x * dy).sum(axis=1), -(y * y * dx).sum(axis=1)]) / area[:, None]
+    moments = np.column_stack([(x * x * dy).sum(axis=1), -(y * y * dx).sum(axis=1)])
+    return np.asarray(moments / area[:, None])
 
 
 def _fourier_derivative(count: int) -> Array:

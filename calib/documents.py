@@ -29,7 +29,7 @@ def read_json(path: Path) -> Any:
 
 
 def validate(model: type[Model], data: object, what: str, fmt: str) -> Model:
-    """Return `data` as `model`; raises FormatError in one sentence that names `what` and the first wrong field.
+    """Return `data` as `model`; raises FormatError in a sentence that names `what` and the first wrong field.
 
     `fmt` is the only value of the key `format` that is accepted.
     """

@@ -5,7 +5,8 @@
     ├── ImageError (OSError)              a view's picture is missing or cannot be read
     ├── DetectionError                    a picture in which the target was not found, and why
     ├── ReadingsError (ValueError)        readings of the wrong number, or not numbers
-    └── UnsolvableError                   the views do not determine what was asked: which, and what would help
+    └── UnsolvableError                   the views do not determine what was asked: which, and what would
+    help
 
 Every message is one sentence that names the file, view, joint or field and says what to do.
 """

@@ -1,7 +1,8 @@
 """The camera's lens: from a point in front of it to a pixel, and back. numpy alone.
 
-Camera axes are x right, y down, z forward. `opencv` has the distortion k1 k2 p1 p2 k3 of OpenCV, `division` the
-one-parameter model of eq 19 and 20, `undistorted = distorted / (1 + k1 r_distorted^2)`, on normalised coordinates.
+Camera axes are x right, y down, z forward. `opencv` has the distortion k1 k2 p1 p2 k3 of OpenCV, `division`
+the one-parameter model of eq 19 and 20, `undistorted = distorted / (1 + k1 r_distorted^2)`, on normalised
+coordinates.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ def project_points(points: ArrayLike, lens: Intrinsics) -> Array:
 
 
 def pixel_rays(pixels: ArrayLike, lens: Intrinsics) -> Array:
-    """Return the unit vectors (..., 3) in the camera's frame that `pixels` (..., 2) look along; NaN where none."""
+    """Return unit vectors (..., 3) in the camera's frame along which `pixels` (..., 2) look; else NaN."""
     flat = undistort(pixels_to_normalised(pixels, lens), lens)
     rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True), dtype=float)
@@ -48,7 +49,7 @@ def pixels_to_normalised(pixels: ArrayLike, lens: Intrinsics) -> Array:
 
 
 def distort(flat: Array, lens: Intrinsics) -> Array:
-    """Return distorted normalised coordinates (..., 2) of undistorted ones; NaN where the model does not hold."""
+    """Return distorted normalised coordinates (..., 2) of undistorted ones; NaN where the model ends."""
     if lens.model == "division":
         return _distort_division(flat, lens.distortion[0])
     return _distort_opencv(flat, lens.distortion)

@@ -3,8 +3,8 @@
 The screws are taken at all readings 0, where the zero-offsets are the parameters themselves. X of a frame is
 the common normal from its own axis to the next one. For axes that are not parallel it is always
 Z1 x Z2, with a signed length along it and a twist in (0, pi): so it stays continuous where axes intersect.
-Near-parallel axes are ill-conditioned in any D-H model, the normal runs off to infinity: poses are computed from
-the screws.
+Near-parallel axes are ill-conditioned in any D-H model, the normal runs off to infinity: poses are computed
+from the screws.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class DhParameters:
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """The chain's frames at all readings 0: `world_from_base` (4, 4), `world_from_link` (m, 4, 4), and its D-H rows."""
+    """Frames at all readings 0: `world_from_base` (4, 4), `world_from_link` (m, 4, 4); and the D-H rows."""
 
     world_from_base: Array
     world_from_link: Array
@@ -72,9 +72,10 @@ def links_of(chain: Chain) -> Links:
 def common_normal(
     axis: Array, point: Array, next_axis: Array, next_point: Array, previous_x: Array | None
 ) -> tuple[Array, Array, Array]:
-    """Return X, its foot O on this axis and its foot P on the next (eq 34 to 37, 43, 53 to 56, 59, corrected).
+    """Return X, its foot O on this axis and its foot P on the next (eq 34 to 37, 43, 53 to 59, corrected).
 
-    Parallel axes take O at `point`; coaxial ones any X normal to the axis, for which `previous_x` is tried first.
+    Parallel axes take O at `point`; coaxial ones any X normal to the axis, for which `previous_x` is tried
+    first.
     """
     cross, cosine, between = np.cross(axis, next_axis), float(axis @ next_axis), next_point - point
     sine = np.linalg.norm(cross)

@@ -1,9 +1,9 @@
-"""The screw of one joint from the camera's poses while it alone moved (the paper's step 1, eq 23 to 31, corrected).
+"""The screw of one joint from camera poses while it alone moved (step 1, eq 23 to 31, corrected).
 
-Each pair of views of one sweep gives a motion of the link, H_12 = world_from_camera_2 camera_1_from_world (eq 24),
-hence an axis, a point and an angle; their weighted means are the screw (eq 31). All pairs are used, not only those
-with the start, so that the start's own error averages out, and the means are Huber's, so that a knocked view does
-not spoil the joint.
+Each pair of views of one sweep gives a motion of the link, H_12 = world_from_camera_2 camera_1_from_world
+(eq 24), hence an axis, a point and an angle; their weighted means are the screw (eq 31). All pairs are
+used, not only those with the start, so that the start's own error averages out, and the means are Huber's,
+so that a knocked view does not spoil the joint.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,8 @@ MAX_STRIDES = 48
 class Screw:
     """A joint's axis in the world: unit `axis` (3,) along growing readings, `point` (3,) in m, `scale` > 0.
 
-    `point` is the axis point nearest the world's origin; a prismatic joint has none of its own and carries zeros.
+    `point` is the axis point nearest the world's origin; a prismatic joint has none of its own and carries
+    zeros.
     """
 
     axis: Array
@@ -39,9 +40,10 @@ class Screw:
 def revolute_screw(poses: Array, readings: Array, sweeps: Ints, name: str, unit: float | None) -> Screw:
     """Return the screw of a revolute joint.
 
-    `poses` (n, 4, 4) are world_from_camera, `readings` (n,) the joint's own, `sweeps` (n,) tells which views were
-    taken one after the other with all else at rest. `unit` is the radians that one reading nominally is,
-    if known. Raises UnsolvableError where the readings do not decide the angle, or the joint did not turn.
+    `poses` (n, 4, 4) are world_from_camera, `readings` (n,) the joint's own, `sweeps` (n,) tells which
+    views were taken one after the other with all else at rest. `unit` is the radians that one reading
+    nominally is, if known. Raises UnsolvableError where the readings do not decide the angle, or the joint
+    did not turn.
     """
     rate = _turning_rate(poses, readings, sweeps, name, unit)
     speed = float(np.linalg.norm(rate))
@@ -49,7 +51,7 @@ def revolute_screw(poses: Array, readings: Array, sweeps: Ints, name: str, unit:
     step = readings[second] - readings[first]
     turn = rotation_log(poses[second, :3, :3] @ np.swapaxes(poses[first, :3, :3], -1, -2))
     angle = np.linalg.norm(turn, axis=1)
-    # A rotation alone leaves the sign of its angle and the number of whole turns open: the rate decides (errata 25-28).
+    # A rotation leaves the sign of its angle and the number of whole turns open: the rate decides.
     sign = np.where(turn @ rate < 0, -1.0, 1.0)
     angle = sign * angle
     direction = np.divide(turn, angle[:, None], out=np.zeros_like(turn), where=np.abs(angle[:, None]) > 0)
@@ -86,7 +88,7 @@ def prismatic_screw(poses: Array, readings: Array, sweeps: Ints, name: str) -> S
 
 
 def robust_mean(values: Array, information: Array, dof: int) -> Array:
-    """Return Huber's mean (k,) of `values` (p, k), each known to 1 / sqrt(`information`) (p,) in `dof` dimensions.
+    """Return Huber's mean (k,) of `values` (p, k), each known to 1 / sqrt(`information`) (p,) in `dof` ways.
 
     The common scale of the deviations comes from their median (Huber 1981, with his 95 % efficient constant).
     """
@@ -100,12 +102,12 @@ def robust_mean(values: Array, information: Array, dof: int) -> Array:
 
 
 def _turning_rate(poses: Array, readings: Array, sweeps: Ints, name: str, unit: float | None) -> Array:
-    """Return the rotation vector per reading (3,), from neighbouring readings, each less than half a turn apart."""
+    """Return the rotation vector per reading (3,), from neighbouring readings less than half a turn apart."""
     first, second = _neighbours(readings, sweeps)
     step = readings[second] - readings[first]
     advice = (
-        f"neighbouring views of joint '{name}' must be less than half a turn apart, or the angle between them "
-        "cannot be decided: take views in between"
+        f"neighbouring views of joint '{name}' must be less than half a turn apart, "
+        "or the angle between them cannot be decided: take views in between"
     )
     if unit is not None and unit * step.max() > 0.98 * np.pi:
         raise UnsolvableError(advice)

@@ -5,7 +5,7 @@ readings, which are in each joint's own reading unit. Unknown keys are kept.
 """
 
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    PlainSerializer,
     PrivateAttr,
     field_validator,
     model_validator,
@@ -41,6 +42,14 @@ def _rigid(rows: list[list[float]]) -> list[list[float]]:
 
 
 RigidRows = Annotated[list[list[Number]], AfterValidator(_rigid)]
+
+
+def _with_kind(target: Target) -> dict[str, Any]:
+    return {"kind": target.kind} | target.model_dump(mode="json", exclude_unset=True)
+
+
+StoredTarget = Annotated[Target, PlainSerializer(_with_kind)]
+"""A target that is written with its kind, whether or not that was said when it was made."""
 
 
 class Document(BaseModel):
@@ -92,7 +101,7 @@ class Camera(Document):
 
 
 class Points(Document):
-    """Target points seen in a view: pictures of the points themselves, or the centroids of disks' pictures."""
+    """Target points seen in a view: pictures of the points themselves, or centroids of disks' pictures."""
 
     ids: list[Annotated[int, Field(ge=0)]]
     pixels: list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
@@ -101,7 +110,9 @@ class Points(Document):
     @model_validator(mode="after")
     def _one_pixel_an_id(self) -> Self:
         if len(self.ids) != len(self.pixels):
-            raise ValueError(f"has {len(self.ids)} ids but {len(self.pixels)} pixels; give one pixel for each id")
+            raise ValueError(
+                f"has {len(self.ids)} ids but {len(self.pixels)} pixels; give one pixel for each id"
+            )
         if len(set(self.ids)) != len(self.ids):
             raise ValueError("an id stands in it twice")
         return self
@@ -118,8 +129,6 @@ class View(Document):
     camera: str | None = None
     use: Literal["fit", "verify"] = "fit"
     approached: list[Literal[-1, 0, 1]] | None = None
-    origin: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Pixel at which the world's origin is seen: which way round a symmetric target is taken."""
 
     @field_validator("image")
     @classmethod
@@ -163,15 +172,26 @@ class Nominal(Document):
     std: NominalStd
 
 
+class WorldOrigin(Document):
+    """Where the world's origin is seen at given readings: which way round a symmetric target is taken."""
+
+    camera: str
+    readings: list[Number]
+    pixel: Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
 class Session(Document):
     """A session; `folder` is where its pictures are."""
 
     format: Literal["activecam.session/1"]
     joints: list[Joint]
     cameras: Annotated[list[Camera], Field(min_length=1)]
-    target: Target
+    target: StoredTarget
     views: list[View]
     nominal: Nominal | None = None
+    origin: WorldOrigin | None = None
+    complete: bool = True
+    """False while a run adds views, and ever after it was cut off: then it is solved as far as it goes."""
 
     _folder: Path = PrivateAttr(default=Path())
 
@@ -201,7 +221,7 @@ class Session(Document):
         return 0 if view.camera is None else [camera.name for camera in self.cameras].index(view.camera)
 
     def camera_link(self, camera: int) -> int:
-        """Return how many joints move `camera`: its link's place in the chain, counted from 1; 0 without joints."""
+        """Return how many joints move `camera`: its link's place in the chain, counted from 1."""
         link = self.cameras[camera].link
         return len(self.joints) if link is None else self.joint_index(link) + 1
 
@@ -222,6 +242,12 @@ class Session(Document):
                 raise ValueError(f"cameras[{index}].link: '{camera.link}' is not a joint of this session")
         if self.nominal is not None and len(self.nominal.dh) != len(joints):
             raise ValueError(f"nominal.dh: has {len(self.nominal.dh)} rows for {len(joints)} joints")
+        if self.origin is not None and self.origin.camera not in cameras:
+            raise ValueError(f"origin.camera: '{self.origin.camera}' is not a camera of this session")
+        if self.origin is not None and len(self.origin.readings) != len(joints):
+            raise ValueError(
+                f"origin.readings: has {len(self.origin.readings)} numbers for {len(joints)} joints"
+            )
         points = len(target_points(self.target))
         for index, view in enumerate(self.views):
             problem = _problem_of_view(view, joints, cameras, points)
@@ -230,13 +256,17 @@ class Session(Document):
         return self
 
 
-def _problem_of_view(view: View, joints: list[str], cameras: list[str], points: int) -> str | None:
+def _problem_of_view(  # noqa: PLR0911 one return a problem
+    view: View, joints: list[str], cameras: list[str], points: int
+) -> str | None:
     if len(view.readings) != len(joints):
         return f"readings: has {len(view.readings)} numbers for {len(joints)} joints"
     if view.joint is not None and view.joint not in joints:
-        return f"joint: '{view.joint}' is not a joint of this session; its joints are {', '.join(joints) or 'none'}"
+        return (
+            f"joint: '{view.joint}' is not a joint of this session; those are {', '.join(joints) or 'none'}"
+        )
     if view.camera is not None and view.camera not in cameras:
-        return f"camera: '{view.camera}' is not a camera of this session; its cameras are {', '.join(cameras)}"
+        return f"camera: '{view.camera}' is not a camera of this session; those are {', '.join(cameras)}"
     if view.approached is not None and len(view.approached) != len(joints):
         return f"approached: has {len(view.approached)} numbers for {len(joints)} joints"
     if view.points is not None and view.points.ids and max(view.points.ids) >= points:

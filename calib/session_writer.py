@@ -11,7 +11,6 @@ from calib.documents import write_durably, write_json
 from calib.errors import ImageError
 from calib.session import Session, View
 
-
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
 
 
@@ -31,6 +30,12 @@ class SessionWriter:
         write_json(self.folder / "session.json", grown)
         self.session = grown
         return view
+
+    def complete(self) -> None:
+        """Say on disk that every planned view has been taken."""
+        done = self.session.model_copy(update={"complete": True}).at(self.folder)
+        write_json(self.folder / "session.json", done)
+        self.session = done
 
     def add_picture(self, picture: Picture, **fields: Any) -> View:
         """Put one more view on disk, `picture` first; `fields` are the view's keys beside `image`.

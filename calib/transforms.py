@@ -8,7 +8,7 @@ Array = NDArray[np.float64]
 
 
 def transform(rotation: ArrayLike, translation: ArrayLike) -> Array:
-    """Return the transforms (..., 4, 4) of `rotation` (..., 3, 3) and `translation` (..., 3) (eq 1, corrected)."""
+    """Return transforms (..., 4, 4) of rotations (..., 3, 3) and translations (..., 3) (eq 1, corrected)."""
     rotation, translation = np.asarray(rotation, dtype=float), np.asarray(translation, dtype=float)
     result = np.zeros((*np.broadcast_shapes(rotation.shape[:-2], translation.shape[:-1]), 4, 4))
     result[..., :3, :3] = rotation
@@ -24,8 +24,8 @@ def inverse(matrix: Array) -> Array:
 
 
 def rotation_log(matrix: Array) -> Array:
-    """Return the rotation vectors (n, 3) in rad of the rotations or transforms `matrix` (n, 3, 3) or (n, 4, 4)."""
-    return Rotation.from_matrix(matrix[..., :3, :3]).as_rotvec()
+    """Return the rotation vectors (n, 3) in rad of rotations (n, 3, 3) or transforms (n, 4, 4)."""
+    return np.asarray(Rotation.from_matrix(matrix[..., :3, :3]).as_rotvec(), dtype=float)
 
 
 def nearest_rotation(matrix: Array) -> Array:
@@ -33,7 +33,7 @@ def nearest_rotation(matrix: Array) -> Array:
     u, _, vt = np.linalg.svd(matrix)
     sign = np.ones((*matrix.shape[:-2], 3))
     sign[..., 2] = np.sign(np.linalg.det(u @ vt))
-    return (u * sign[..., None, :]) @ vt
+    return np.asarray((u * sign[..., None, :]) @ vt)
 
 
 def rigid(rows: ArrayLike) -> Array:
@@ -50,10 +50,14 @@ def mean_transform(matrices: Array) -> Array:
 def pose_error(a: Array, b: Array) -> tuple[Array, Array]:
     """Return the distances (n,) in m and the angles (n,) in rad between the poses `a` and `b` (n, 4, 4)."""
     distance = np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1)
-    return distance, np.linalg.norm(rotation_log(np.swapaxes(a[..., :3, :3], -1, -2) @ b[..., :3, :3]), axis=-1)
+    return distance, np.linalg.norm(
+        rotation_log(np.swapaxes(a[..., :3, :3], -1, -2) @ b[..., :3, :3]), axis=-1
+    )
 
 
-def any_normal(axis: Array, preferred: ArrayLike = (1.0, 0.0, 0.0), other: ArrayLike = (0.0, 1.0, 0.0)) -> Array:
+def any_normal(
+    axis: Array, preferred: ArrayLike = (1.0, 0.0, 0.0), other: ArrayLike = (0.0, 1.0, 0.0)
+) -> Array:
     """Return `preferred` made normal to the unit vector `axis` (3,), or `other` where that is degenerate."""
     for candidate in (np.asarray(preferred, dtype=float), np.asarray(other, dtype=float)):
         normal = candidate - (candidate @ axis) * axis

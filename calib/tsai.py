@@ -1,8 +1,8 @@
 """Tsai's two-stage calibration from a single view, with the division model (eq 15 to 22, 72, 73, corrected).
 
-Stage 1 takes rotation and the sideways translation from the radial alignment constraint, which holds whatever the focal
-length and radial distortion; stage 2 takes focal length, distortion and depth from one linear system. The
-image centre is to be known, for a coplanar target the aspect ratio too.
+Stage 1 takes rotation and the sideways translation from the radial alignment constraint, which holds
+whatever the focal length and radial distortion; stage 2 takes focal length, distortion and depth from one
+linear system. The image centre is to be known, for a coplanar target the aspect ratio too.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,9 @@ class SingleView:
 def tsai(world: ArrayLike, pixels: ArrayLike, centre: ArrayLike, aspect: float = 1.0) -> SingleView:
     """Calibrate from points `world` (n, 3) in m seen at `pixels` (n, 2), with the image centre `centre` (2,).
 
-    `aspect` is fx / fy; points that are not in one plane find it themselves, and then it is not used. Coplanar
-    points must have Z = 0. Raises UnsolvableError for too few points, or a target parallel to the image plane.
+    `aspect` is fx / fy; points that are not in one plane find it themselves, and then it is not used.
+    Coplanar points must have Z = 0. Raises UnsolvableError for too few points, or a target parallel to the
+    image plane.
     """
     world, pixels = np.asarray(world, dtype=float), np.asarray(pixels, dtype=float)
     spread = np.linalg.svd(world - world.mean(axis=0), compute_uv=False) if len(world) else np.zeros(3)
@@ -42,10 +43,10 @@ def tsai(world: ArrayLike, pixels: ArrayLike, centre: ArrayLike, aspect: float =
         raise UnsolvableError("Tsai's method wants a coplanar target in the world's plane Z = 0")
     if len(world) < (6 if coplanar else 8) or spread[1] <= 1e-6 * spread[0]:
         raise UnsolvableError(
-            f"Tsai's method needs 6 points in a plane, or 8 that are not, and not in a line; it was given {len(world)}"
+            f"Tsai's method needs 6 points in a plane, or 8 that are not; it was given {len(world)}"
         )
     seen = pixels - np.asarray(centre, dtype=float)
-    # Row 72 is divided by Ty, so the world's origin is moved to the point seen farthest above or below the centre.
+    # Eq 72 divides by Ty: take the point seen farthest above or below the centre as origin.
     origin = world[np.argmax(np.abs(seen[:, 1]))]
     local = world - origin
     if coplanar:
@@ -91,8 +92,8 @@ def _stage_1_coplanar(world: Array, seen: Array) -> tuple[Array, Array]:
     rotation = np.array([[r1, r2, r3], [r4, r5, r6], np.cross([r1, r2, r3], [r4, r5, r6])])
     if np.hypot(r3, r6) < PARALLEL_TO_IMAGE:
         raise UnsolvableError(
-            "the target is parallel to the image plane, where focal length and distance cannot be told apart: "
-            "tilt it by 20 degrees or more"
+            "the target is parallel to the image plane, where focal length and distance cannot be told "
+            "apart: tilt it by 20 degrees or more"
         )
     return nearest_rotation(rotation), np.array([tx, ty])
 
@@ -111,7 +112,7 @@ def _stage_1(world: Array, seen: Array) -> tuple[Array, Array, float]:
 
 
 def _sign_of_ty(sideways: Array, seen: Array) -> float:
-    """Return the sign of Ty: points must be seen on the side of the centre where they are (`sideways` for Ty > 0)."""
+    """Return the sign of Ty: points are seen on the side where they are, `sideways` being for Ty > 0."""
     return 1.0 if float((sideways * seen).sum()) > 0 else -1.0
 
 

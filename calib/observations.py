@@ -1,0 +1,102 @@
+"""What was measured, as arrays: each view's points found in its picture, or given, or its pose."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection import detect
+from calib.errors import DetectionError, ImageError, UnsolvableError
+from calib.session import Session, View
+from calib.targets import TargetSymmetry
+from calib.transforms import rigid
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One view's measurement.
+
+    `ids` (n,) and `pixels` (n, 2) are points of the target and where they are seen, `disk` whether these are
+    centroids of disks. `pose` is the camera's pose where another system gave it, else None.
+    """
+
+    view: int
+    camera: int
+    ids: NDArray[np.int64]
+    pixels: Array
+    disk: bool
+    pose: Array | None = None
+
+    def turned(self, symmetry: TargetSymmetry) -> "Observation":
+        """Return the same picture read the other way round that `symmetry` allows."""
+        label = np.argsort(symmetry.permutation)[self.ids]
+        order = np.argsort(label)
+        return replace(self, ids=label[order], pixels=self.pixels[order])
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """A session's observations, and a sentence for each view that gave none."""
+
+    observations: list[Observation]
+    missing: list[str]
+
+    def of(self, views: set[int]) -> list[Observation]:
+        """Return the observations of these views."""
+        return [observation for observation in self.observations if observation.view in views]
+
+
+def observe(session: Session, progress: Progress | None = None) -> Observed:
+    """Return what each view measured, finding the target in its picture where it carries one.
+
+    A picture in which the target is not found is left out and named. Raises ImageError for a picture that
+    is missing or unreadable, and UnsolvableError where no view shows the target or there are no views at
+    all.
+    """
+    if not session.views:
+        raise UnsolvableError("the session has no views: take some before solving it")
+    observations, missing = [], []
+    for index, view in enumerate(session.views):
+        if progress is not None and view.image is not None:
+            progress(f"looking for the target in view {index + 1} of {len(session.views)}")
+        try:
+            observations.append(_observation(session, index, view))
+        except DetectionError as error:
+            missing.append(f"view {index} ({view.image}): {error}")
+    if not observations:
+        raise UnsolvableError(
+            f"the target was not found in any of the {len(session.views)} views: {missing[0]}"
+        )
+    return Observed(observations, missing)
+
+
+def _observation(session: Session, index: int, view: View) -> Observation:
+    camera = session.camera_index(view)
+    if view.world_from_camera is not None:
+        nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
+        return Observation(index, camera, *nothing, disk=False, pose=rigid(view.world_from_camera))
+    if view.points is not None:
+        ids = np.array(view.points.ids, dtype=np.int64)
+        pixels = np.array(view.points.pixels, dtype=float).reshape(-1, 2)
+        return Observation(index, camera, ids, pixels, disk=view.points.disk == "centroid")
+    detection = detect(read_picture(session, view), session.target)
+    return Observation(index, camera, detection.ids, detection.pixels, disk=detection.disk == "centroid")
+
+
+def read_picture(session: Session, view: View) -> NDArray[np.uint8]:
+    """Return the view's picture as it is on disk; raises ImageError that names the file."""
+    assert view.image is not None
+    path = session.folder / view.image
+    if not path.is_file():
+        raise ImageError(f"{path}: the picture is missing; put it back, or take its view out of session.json")
+    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if picture is None:
+        raise ImageError(
+            f"{path}: cannot be read as a picture; put it back, or take its view out of session.json"
+        )
+    return np.asarray(picture)

@@ -1,0 +1,60 @@
+"""The camera's pose from one view of the target, given its lens."""
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from calib.errors import UnsolvableError
+from calib.lens import pixels_to_normalised, project_points, undistort
+from calib.session import Intrinsics
+from calib.transforms import inverse, transform
+
+Array = NDArray[np.float64]
+
+
+def pose_from_view(world: ArrayLike, pixels: ArrayLike, lens: Intrinsics) -> Array:
+    """Return world_from_camera (4, 4) that best explains points `world` (n, 3) in m seen at `pixels` (n, 2).
+
+    Of the two poses that a plane nearly allows the one with the smaller reprojection error is taken. Raises
+    UnsolvableError for fewer than four points, or points in a line.
+    """
+    world, pixels = np.asarray(world, dtype=float), np.asarray(pixels, dtype=float)
+    spread = np.linalg.svd(world - world.mean(axis=0), compute_uv=False) if len(world) else np.zeros(3)
+    if len(world) < 4 or spread[1] < 1e-6 * spread[0]:
+        raise UnsolvableError(
+            f"a camera's pose needs four points that are not in a line; {len(world)} are seen"
+        )
+    flat = undistort(pixels_to_normalised(pixels, lens), lens)
+    if not np.isfinite(flat).all():
+        raise UnsolvableError(
+            "points are seen where the lens model does not reach: are the intrinsics right?"
+        )
+    candidates = [_refined(world, flat, guess) for guess in _guesses(world, flat)]
+    errors = [_reprojection(world, pixels, lens, candidate) for candidate in candidates]
+    return inverse(candidates[int(np.argmin(errors))])
+
+
+def _guesses(world: Array, flat: Array) -> list[tuple[Array, Array]]:
+    coplanar = np.abs(world[:, 2]).max() < 1e-9
+    method = cv2.SOLVEPNP_IPPE if coplanar else cv2.SOLVEPNP_SQPNP
+    count, rotations, translations, _ = cv2.solvePnPGeneric(world, flat, np.eye(3), None, flags=method)
+    if count == 0:
+        raise UnsolvableError(
+            "no camera pose explains where the target's points are seen: are their ids right?"
+        )
+    return [
+        (np.asarray(r, dtype=float), np.asarray(t, dtype=float))
+        for r, t in zip(rotations, translations, strict=True)
+    ]
+
+
+def _refined(world: Array, flat: Array, guess: tuple[Array, Array]) -> Array:
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-14)
+    rotation, translation = cv2.solvePnPRefineLM(world, flat, np.eye(3), None, *guess, criteria)
+    return transform(cv2.Rodrigues(rotation)[0], translation[:, 0])
+
+
+def _reprojection(world: Array, pixels: Array, lens: Intrinsics, camera_from_world: Array) -> float:
+    seen = project_points(world @ camera_from_world[:3, :3].T + camera_from_world[:3, 3], lens)
+    error = float(((seen - pixels) ** 2).sum())
+    return error if np.isfinite(error) else np.inf

@@ -1,0 +1,63 @@
+"""Which views belong together: one joint moved alone, one camera, all else at rest."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+SAME_START = 0.01
+"""Two views belong to one sweep when their idle readings agree within this part of the joint's range."""
+
+
+def sweep_labels(readings: Array, exercised: Ints, cameras: Ints, links: Sequence[int]) -> Ints:
+    """Return for each view and joint (n, m) which of the joint's sweeps the view belongs to, -1 for none.
+
+    `readings` (n, m); `exercised` (n,) is the joint moved alone in a view, -1 for none; `cameras` (n,) who
+    took it; `links` how many joints move each camera. A sweep has the joint at two readings or more.
+    """
+    labels = np.full(readings.shape, -1, dtype=np.intp)
+    if not len(readings):
+        return labels
+    spans = np.ptp(readings, axis=0)
+    reach = np.asarray(links)[cameras]
+    for joint in range(readings.shape[1]):
+        own = np.flatnonzero((exercised == joint) & (reach > joint))
+        idle = np.delete(readings[own] / np.where(spans > 0, spans, 1), joint, axis=1)
+        clusters = _clusters(np.column_stack([idle, cameras[own]]), SAME_START)
+        for cluster in np.unique(clusters):
+            members = own[clusters == cluster]
+            if np.ptp(readings[members, joint]) > 0:
+                labels[members, joint] = cluster
+    return labels
+
+
+def readings_at_rest(readings: Array, labels: Ints) -> Array:
+    """Return the readings (n, m) with those of idle joints replaced by their sweep's mean.
+
+    An idle joint stands still: what its readings jitter is their own noise, and the mean has less of it.
+    """
+    at_rest = readings.copy()
+    for joint in range(labels.shape[1]):
+        for sweep in np.unique(labels[labels[:, joint] >= 0, joint]):
+            members = labels[:, joint] == sweep
+            own = at_rest[members, joint]
+            # A shift by the first member keeps readings that did not jitter exactly as they are.
+            base = at_rest[members][0]
+            at_rest[members] = base + (at_rest[members] - base).mean(axis=0)
+            at_rest[members, joint] = own
+    return at_rest
+
+
+def _clusters(rows: Array, tolerance: float) -> Ints:
+    """Return a label for each row (n,), shared by all within `tolerance` of a cluster's first row."""
+    labels = np.zeros(len(rows), dtype=np.intp)
+    heads: list[Array] = []
+    for index, row in enumerate(rows):
+        near = [label for label, head in enumerate(heads) if np.abs(row - head).max(initial=0) <= tolerance]
+        labels[index] = near[0] if near else len(heads)
+        if not near:
+            heads.append(row)
+    return labels
