@@ -8,7 +8,7 @@ Offsets = NDArray[np.float32]
 
 CORNERS: Offsets = np.array([[0, 0], [0.5, 0.5], [-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5]], np.float32)
 """Where in a pixel `share` wants the depth: the centre and the corners, opposite ones in pairs."""
-_STRAIGHT = 0.05
+_STRAIGHT = 0.15
 """Pixels by which an edge may bend within a pixel and still be taken for straight."""
 
 
@@ -31,7 +31,7 @@ def share(depths: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     distance = centre / slope
     bend = np.maximum(abs(lower_right + upper_left - 2 * centre), abs(upper_right + lower_left - 2 * centre))
     reach = np.max(np.abs(depths[:, 1:] - centre[:, None]), axis=1)
-    doubtful = (np.abs(centre) <= 1.5 * reach) & (bend > _STRAIGHT * slope)
+    doubtful = (np.abs(centre) <= 1.05 * reach) & (bend > _STRAIGHT * slope)
     return _area(distance, np.abs(slope_u) / slope, np.abs(slope_v) / slope), doubtful
 
 

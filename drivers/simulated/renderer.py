@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 Grey = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-_SAMPLES = 256
+_SAMPLES = 64
 """Rays in a pixel that has a corner of the pattern in it."""
-_BATCH = 512
+_BATCH = 2048
 """Such pixels sampled at a time, so that their rays stay in the processor's cache."""
 _BACKGROUND_STEP = 16
 """Pixels between the places where the smooth background is computed."""
