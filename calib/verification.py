@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calib.calibration import Calibration
 from calib.closed_form import PoseViews
 from calib.errors import FormatError
-from calib.observations import observe
+from calib.observations import Progress, observe
 from calib.residuals import ViewResidual, view_residual
 from calib.session import JointKind, Session
 from calib.sweeps import sweep_labels
@@ -90,7 +90,9 @@ class Verification:
     warnings: list[str]
 
 
-def verify(calibration: Calibration, session: Session) -> Verification:
+def verify(
+    calibration: Calibration, session: Session, progress: Progress | None = None
+) -> Verification:
     """Judge `calibration` on the views of `session`: those marked `verify`, or all where none is.
 
     Raises FormatError where the session's joints or cameras are not the calibration's, UnsolvableError
@@ -100,7 +102,7 @@ def verify(calibration: Calibration, session: Session) -> Verification:
     marked = any(view.use == "verify" for view in session.views)
     judged = [view for view in session.views if view.use == "verify" or not marked]
     session = session.with_views(judged)
-    observed = observe(session)
+    observed = observe(session, progress)
     residuals = [view_residual(calibration, session, observation) for observation in observed.observations]
     errors = np.concatenate([residual.errors for residual in residuals])
     placed = bool(calibration.joints)

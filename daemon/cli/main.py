@@ -1,0 +1,117 @@
+"""The `activecam` command: errors become one sentence on stderr and an exit status of 1 or 2."""
+
+import sys
+from collections.abc import Sequence
+from importlib import metadata
+from typing import Annotated
+
+import typer
+
+from calib.errors import CalibError, ReadingsError
+from daemon.cli import demo, pose, profile, serve, solve, truth, verify
+from daemon.cli.console import errors
+from daemon.errors import DaemonError
+from daemon.profile import ProfileError
+from drivers.errors import DriverError
+
+COULD_NOT, WRONG_CALL, INTERRUPTED = 1, 2, 130
+
+# Newer typers carry a click of their own under a private name: these are its classes, whichever it is.
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+ClickError: type[Exception] = typer.BadParameter.__mro__[2]
+
+app = typer.Typer(
+    name="activecam",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"activecam {metadata.version('activecam')}")
+        raise typer.Exit
+
+
+@app.callback()
+def activecam(
+    version: Annotated[  # noqa: ARG001 typer calls _print_version with it
+        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Calibrate a camera on motorised axes with the camera itself, and serve its pose."""
+
+
+for command in (demo, serve, solve, pose, verify, truth):
+    command.register(app)
+app.add_typer(profile.app, name="profile")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit with 0, 1 (could not), 2 (wrong call) or 130 (interrupted)."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    sys.exit(_run(spread_readings(given or ["--help"])))
+
+
+def _run(arguments: list[str]) -> int:
+    try:
+        # Without click's own handling a command's return value comes back instead of an exit.
+        status = app(arguments, standalone_mode=False)
+    except UsageError as error:
+        context = getattr(error, "ctx", None)
+        where = "activecam" if context is None else context.command_path
+        return _fail(f"{_sentence(error)}; see '{where} --help'", WRONG_CALL)
+    except ClickError as error:
+        return _fail(_sentence(error), COULD_NOT)
+    except (typer.Abort, KeyboardInterrupt):
+        return _fail("interrupted", INTERRUPTED)
+    except ReadingsError as error:
+        return _fail(str(error), WRONG_CALL)
+    except DaemonError as error:
+        return _fail(str(error), error.exit_status)
+    except (CalibError, DriverError, ProfileError) as error:
+        return _fail(str(error), COULD_NOT)
+    except BrokenPipeError:
+        return COULD_NOT
+    except OSError as error:
+        what = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{what}{error.strerror or error}", COULD_NOT)
+    return status if isinstance(status, int) else 0
+
+
+def _sentence(error: Exception) -> str:
+    """Return click's message for people, which is not its str()."""
+    message: str = error.format_message().replace("Value error, ", "")  # type: ignore[attr-defined]
+    return (message[:1].lower() + message[1:]).rstrip(".")
+
+
+def _fail(sentence: str, status: int) -> int:
+    errors.print(f"activecam: {sentence}", markup=False, highlight=False, soft_wrap=True)
+    return status
+
+
+def spread_readings(arguments: list[str]) -> list[str]:
+    """Return the arguments with `--readings 12.5 -30` as `--readings=12.5 --readings=-30`.
+
+    Click has no options with any number of values, and would take a negative reading for an option.
+    """
+    spread: list[str] = []
+    values = False
+    for argument in arguments:
+        if argument == "--readings":
+            values = True
+        elif values and _is_number(argument):
+            spread.append(f"--readings={argument}")
+        else:
+            values = False
+            spread.append(argument)
+    return spread
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

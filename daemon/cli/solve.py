@@ -1,0 +1,94 @@
+"""`activecam solve`: from a session to a calibration."""
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from calib import Calibration, Session, load_session, save_calibration
+from daemon.cli.console import output, progress_line, warn
+
+
+class Method(StrEnum):
+    """How to solve."""
+
+    closed_form = "closed_form"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(epilog="Example: activecam solve sessions/monday -o monday.json")(solve)
+
+
+def solve(
+    session: Annotated[Path, typer.Argument(help="The session's folder, or its session.json.")],
+    result: Annotated[
+        Path, typer.Option("--output", "-o", help="Where to write the calibration.")
+    ] = Path("calibration.json"),
+    method: Annotated[Method, typer.Option(help="How to solve.")] = Method.closed_form,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON.")] = False,
+) -> None:
+    """Calibrate from a session's views: chain, camera on it, base and lens, with no initial guess."""
+    from calib import solve as solve_session
+
+    loaded = load_session(session)
+    with progress_line() as progress:
+        calibration = solve_session(loaded, method.value, progress)
+    save_calibration(calibration, result)
+    _keep_origin(loaded, calibration)
+    for warning in calibration.quality.warnings:
+        warn(warning)
+    if as_json:
+        typer.echo(json.dumps(calibration.model_dump(mode="json")))
+        return
+    print_calibration(calibration)
+    output.print(f"Calibration written to {result}", soft_wrap=True)
+
+
+def _keep_origin(session: Session, calibration: Calibration) -> None:
+    """Store in the session which way round its symmetric target was taken, so that it stays that way.
+
+    A session that cannot be written to is solved all the same.
+    """
+    from calib.documents import write_json
+
+    if session.origin is not None or calibration.origin is None or len(calibration.joints) < len(session.joints):
+        return
+    try:
+        write_json(session.folder / "session.json", session.model_copy(update={"origin": calibration.origin}))
+    except OSError:
+        return
+
+
+def print_calibration(calibration: Calibration) -> None:
+    """Print joints, lenses and quality as tables: mm and degrees, as people read them."""
+    joints = Table(title="Joints, in the world at all readings 0", title_justify="left")
+    for heading in ("joint", "kind", "scale", "axis", "point (mm)"):
+        joints.add_column(heading)
+    for joint in calibration.joints:
+        si = "m" if joint.kind == "prismatic" else "rad"
+        joints.add_row(
+            joint.name,
+            joint.kind,
+            f"{joint.scale:.9g} {si}/{joint.reading_unit}",
+            "  ".join(f"{value:+.6f}" for value in joint.axis),
+            "  ".join(f"{1e3 * value:+.3f}" for value in joint.point),
+        )
+    lenses = Table(title="Cameras", title_justify="left")
+    for heading in ("camera", "rides on", "lens", "fx", "fy", "cx", "cy"):
+        lenses.add_column(heading)
+    for camera in calibration.cameras:
+        lens = camera.intrinsics
+        values = [] if lens is None else [f"{value:.2f}" for value in (lens.fx, lens.fy, lens.cx, lens.cy)]
+        lenses.add_row(camera.name, camera.link or "nothing", "given poses" if lens is None else lens.model, *values)
+    if calibration.joints:
+        output.print(joints)
+    output.print(lenses)
+    quality = calibration.quality
+    if quality.rms_px is not None:
+        output.print(f"Residual of the fit: {quality.rms_px:.3f} px rms (small residuals alone do not say good)")
+    if quality.held_out_rms_px is not None:
+        output.print(f"Prediction of held-out views: {quality.held_out_rms_px:.3f} px rms")
