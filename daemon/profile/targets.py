@@ -1,6 +1,6 @@
 """The profile's `[target]`: the session's targets (`calib.targets`), with lengths as quantities."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
@@ -16,6 +16,7 @@ class CircleGridTable(calib.CircleGrid):
 
     model_config = _CONFIG
 
+    kind: Literal["circle_grid"]
     pitch: PositiveLength
     disk_diameter: PositiveLength
     pitch_std: PitchStd | None = None
@@ -26,6 +27,7 @@ class AsymmetricCircleGridTable(calib.AsymmetricCircleGrid):
 
     model_config = _CONFIG
 
+    kind: Literal["asymmetric_circle_grid"]
     pitch: PositiveLength
     disk_diameter: PositiveLength
     pitch_std: PitchStd | None = None
@@ -36,6 +38,7 @@ class ChessboardTable(calib.Chessboard):
 
     model_config = _CONFIG
 
+    kind: Literal["chessboard"]
     pitch: PositiveLength
     pitch_std: PitchStd | None = None
 
@@ -45,6 +48,7 @@ class CharucoTable(calib.Charuco):
 
     model_config = _CONFIG
 
+    kind: Literal["charuco"]
     pitch: PositiveLength
     marker: PositiveLength
     pitch_std: PitchStd | None = None
@@ -55,6 +59,7 @@ class AprilGridTable(calib.AprilGrid):
 
     model_config = _CONFIG
 
+    kind: Literal["aprilgrid"]
     tag: PositiveLength
     spacing: PositiveLength
     pitch_std: PitchStd | None = None
