@@ -134,10 +134,11 @@ def _unknown_key(model: type[BaseModel], unknown: ErrorDetails) -> str:
 def _sentence(details: ErrorDetails) -> str:
     if details["type"] == "value_error":
         return str(details["ctx"]["error"])
-    if details["type"] in ("too_short", "too_long"):
-        context = details["ctx"]
-        wanted = context.get("max_length", context.get("min_length"))
-        return f"has {context['actual_length']} items, which should be {wanted}"
+    context = details.get("ctx", {})
+    if details["type"] == "too_short":
+        return f"must hold at least {context['min_length']}, not {context['actual_length']}"
+    if details["type"] == "too_long":
+        return f"must hold at most {context['max_length']}, not {context['actual_length']}"
     message = details["msg"]
     if not message.startswith("Input should be"):
         return message[:1].lower() + message[1:]

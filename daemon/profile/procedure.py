@@ -96,13 +96,18 @@ def _sweep(table: SweepTable, path: KeyPath, specs: Mapping[str, AxisSpec], prob
     if table.positions is not None:
         values = _evenly_spaced(values[0], values[1], table.positions)
     # The joint itself need not be told where to start: its first reading is the natural place.
-    start = {table.joint: table.readings[0] if table.readings else table.first} | table.start
-    return Sweep(table.joint, _readings(start, (*path, "start"), specs, problems), tuple(values), table.use)
+    start = _readings(table.start, (*path, "start"), specs, problems, {table.joint: values[0]})
+    return Sweep(table.joint, start, tuple(values), table.use)
 
 
 def _readings(
-    written: Mapping[str, object], path: KeyPath, specs: Mapping[str, AxisSpec], problems: Problems
+    written: Mapping[str, object],
+    path: KeyPath,
+    specs: Mapping[str, AxisSpec],
+    problems: Problems,
+    natural: Readings = MappingProxyType({}),
 ) -> Readings:
+    """Return where every axis stands: as written, else at its `natural` place, else at its 0."""
     for name in written.keys() - specs.keys():
         problems.add((*path, name), f"'{name}' is not an axis; axes are {', '.join(specs)}")
     readings = {}
@@ -110,6 +115,8 @@ def _readings(
         low, high = spec.limits
         if name in written:
             readings[name] = _reading(written[name], (*path, name), spec, problems)
+        elif name in natural:
+            readings[name] = natural[name]
         elif low <= 0 <= high:
             readings[name] = 0.0
         else:

@@ -24,7 +24,7 @@ def check_simulation(
     simulated = [path for path, driver in named if driver == SIMULATED]
     if table.simulation is None:
         for path in simulated[:1]:
-            problems.add(path, "a simulated device needs the table [simulation], which says what is true")
+            problems.add(path, "a simulated device needs the table [simulation]")
         return
     if not simulated:
         problems.add(("simulation",), "no device is simulated: remove the table, or use driver = 'simulated'")

@@ -1,0 +1,127 @@
+"""The shipped rigs: every picture of their procedures shows the whole target, large enough to measure."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from daemon.profile import PlannedView, Profile, load_profile, shipped_profiles
+from drivers.clock import SystemClock
+from drivers.simulated import SimulatedWorld
+
+MARGIN = 15.0
+"""Pixels around the paper: rigs of the simulation hit their targets to much less than one."""
+SPACING = 15.0
+"""Pixels between neighbouring points, below which detectors become unsure."""
+
+
+@pytest.fixture(scope="module", params=shipped_profiles())
+def profile(request: pytest.FixtureRequest) -> Profile:
+    return load_profile(request.param)
+
+
+@pytest.fixture(scope="module")
+def world(profile: Profile) -> SimulatedWorld:
+    return _world(profile)
+
+
+def _world(profile: Profile) -> SimulatedWorld:
+    assert profile.simulation is not None
+    specs = [axis.spec for axis in profile.axes]
+    return SimulatedWorld(profile.simulation, specs, profile.target.model_dump(), SystemClock())
+
+
+def _readings(view: PlannedView) -> list[float]:
+    return list(view.readings.values())
+
+
+def _nearest(points: NDArray[np.float64]) -> float:
+    distances = np.linalg.norm(points[:, None] - points[None], axis=2)
+    np.fill_diagonal(distances, np.inf)
+    return float(distances.min())
+
+
+def test_all_four_are_there() -> None:
+    assert shipped_profiles() == ("pan-tilt", "paper-table", "six-axis-arm", "turntable")
+
+
+def test_the_whole_paper_is_in_every_picture(profile: Profile, world: SimulatedWorld) -> None:
+    size = np.array([profile.camera.spec.width, profile.camera.spec.height])
+    for view in profile.procedure.planned_views():
+        paper = world.project(world.plate.outline(), _readings(view))
+        assert np.all(paper > MARGIN), view
+        assert np.all(paper < size - 1 - MARGIN), view
+
+
+def test_the_target_is_large_enough_to_measure(profile: Profile, world: SimulatedWorld) -> None:
+    for view in profile.procedure.planned_views():
+        assert _nearest(world.project(world.target_points(), _readings(view))) > SPACING, view
+
+
+def test_the_target_is_tilted_enough_to_tell_focal_length_from_distance(
+    profile: Profile, world: SimulatedWorld
+) -> None:
+    tilts = [
+        np.degrees(np.arccos(world.world_from_camera(_readings(view))[2, 2]))
+        for view in profile.procedure.planned_views()
+    ]
+    assert np.median(tilts) > 20
+    assert max(tilts) < 60
+
+
+def test_each_joint_is_exercised_alone_by_at_least_nine_positions(profile: Profile) -> None:
+    for axis in profile.axes:
+        fitted = [s for s in profile.procedure.sweeps if s.joint == axis.spec.name and s.use == "fit"]
+        assert sum(len(sweep.readings) for sweep in fitted) >= 9
+
+
+def test_each_joint_is_exercised_far_enough(profile: Profile, world: SimulatedWorld) -> None:
+    for index, axis in enumerate(profile.axes):
+        (sweep,) = [s for s in profile.procedure.sweeps if s.joint == axis.spec.name and s.use == "fit"]
+        ends = [{**sweep.start, sweep.joint: reading} for reading in (sweep.readings[0], sweep.readings[-1])]
+        first, last = (world.displacements(list(end.values()))[index] for end in ends)
+        assert last - first > (np.radians(15) if axis.spec.kind == "revolute" else 0.1)
+
+
+def test_held_out_views_are_not_those_of_the_fit(profile: Profile) -> None:
+    views = list(profile.procedure.planned_views())
+    fitted = {tuple(_readings(view)) for view in views if view.use == "fit"}
+    held_out = [tuple(_readings(view)) for view in views if view.use == "verify"]
+    assert held_out
+    assert not fitted & set(held_out)
+
+
+def test_no_scale_is_the_nominal_one(profile: Profile) -> None:
+    assert profile.simulation is not None
+    for axis, joint in zip(profile.axes, profile.simulation.joints, strict=True):
+        nominal = {"mm": 1e-3, "deg": np.pi / 180}.get(axis.spec.unit)
+        if nominal is not None:
+            assert 5e-5 < abs(joint.scale / nominal - 1) < 5e-3
+
+
+def test_the_papers_table_is_the_papers() -> None:
+    profile = load_profile("paper-table")
+    assert [(axis.spec.kind, axis.spec.unit) for axis in profile.axes] == [
+        ("prismatic", "mm"),
+        ("revolute", "deg"),
+    ]
+    assert profile.target.kind == "circle_grid"
+    assert profile.target.rows * profile.target.columns == 42
+    assert [(s.joint, len(s.readings), s.use) for s in profile.procedure.sweeps] == [
+        ("slide", 11, "fit"),
+        ("pan", 11, "fit"),
+        ("slide", 11, "verify"),
+        ("pan", 11, "verify"),
+    ]
+    assert profile.procedure.sweeps[0].readings[-1] - profile.procedure.sweeps[0].readings[0] == 1000
+
+
+def test_the_papers_disks_are_20_pixels_across_at_least() -> None:
+    profile = load_profile("paper-table")
+    world = _world(profile)
+    assert profile.target.kind == "circle_grid"
+    # The diameter along a row, which the plate's tilt does not foreshorten much.
+    radius = np.array([profile.target.disk_diameter / 2, 0, 0])
+    centres = world.target_points()
+    for view in profile.procedure.planned_views():
+        left, right = (world.project(centres + side * radius, _readings(view)) for side in (-1, 1))
+        assert np.linalg.norm(right - left, axis=1).min() > 20, view
