@@ -9,12 +9,10 @@ from pydantic_core import ErrorDetails
 from daemon.profile.errors import ProfileError
 from daemon.profile.keys import closest_key, known_keys
 from daemon.profile.lines import KeyPath, Lines
+from daemon.profile.sentences import sentence
 from drivers.quantities import RateSuffix, in_reading_unit
 
 Model = TypeVar("Model", bound=BaseModel)
-
-_LONGEST_SHOWN = 40
-"""Characters of a wrong value that are repeated in the message."""
 
 
 class Problems:
@@ -82,7 +80,7 @@ class Problems:
                 key, tags = context["discriminator"].strip("'"), context["expected_tags"]
                 self.add((*path, *location, key), f"must be one of {tags}, not '{context['tag']}'")
             case _:
-                self.add(path + _written(location, table), _sentence(details))
+                self.add(path + _written(location, table), sentence(details))
 
     def _label(self, path: KeyPath) -> str:
         """Return `axes[1].limits (pan)`: the path as people write it, and what its element is called."""
@@ -129,20 +127,3 @@ def _unknown_key(model: type[BaseModel], unknown: ErrorDetails) -> str:
         return f"there is no such key; did you mean '{meant[-1]}'?"
     known = ", ".join(known_keys(model, unknown["loc"][:-1]))
     return f"there is no such key; its table's keys are {known}" if known else "its table has no keys"
-
-
-def _sentence(details: ErrorDetails) -> str:
-    if details["type"] == "value_error":
-        return str(details["ctx"]["error"])
-    context = details.get("ctx", {})
-    if details["type"] == "too_short":
-        return f"must hold at least {context['min_length']}, not {context['actual_length']}"
-    if details["type"] == "too_long":
-        return f"must hold at most {context['max_length']}, not {context['actual_length']}"
-    message = details["msg"]
-    if not message.startswith("Input should be"):
-        return message[:1].lower() + message[1:]
-    value = details["input"]
-    shown = f"'{value}'" if isinstance(value, str) else repr(value)
-    found = f", not {shown}" if len(shown) <= _LONGEST_SHOWN else ""
-    return f"must be{message.removeprefix('Input should be')}{found}"
