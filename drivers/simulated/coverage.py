@@ -11,6 +11,8 @@ CORNERS: Offsets = np.array([[0, 0], [0.5, 0.5], [-0.5, -0.5], [0.5, -0.5], [-0.
 _STRAIGHT = 0.15
 """Pixels by which an edge may bend within a pixel and still be taken for straight."""
 
+_TINY = np.float32(1e-12)
+
 
 def spread(count: int) -> Offsets:
     """Return places (count, 2) within a pixel, evenly spread: multiples of the plastic number's powers."""
@@ -27,7 +29,7 @@ def share(depths: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     centre, lower_right, upper_left, upper_right, lower_left = depths.T
     slope_u = (lower_right + upper_right - upper_left - lower_left) / 2
     slope_v = (lower_right + lower_left - upper_left - upper_right) / 2
-    slope = np.maximum(np.hypot(slope_u, slope_v), np.float32(1e-12))
+    slope = np.maximum(np.hypot(slope_u, slope_v), _TINY)
     distance = centre / slope
     bend = np.maximum(abs(lower_right + upper_left - 2 * centre), abs(upper_right + lower_left - 2 * centre))
     reach = np.max(np.abs(depths[:, 1:] - centre[:, None]), axis=1)
@@ -41,8 +43,8 @@ def _area(distance: Floats, a: Floats, b: Floats) -> Floats:
     (a, b) are the absolute components of the lines' unit normals.
     """
     far, near = (a + b) / 2, np.abs(a - b) / 2  # distances of the square's corners from its centre
-    inner = np.abs(distance)
-    band = 0.5 + inner / np.maximum(a, b)
-    corner = 1.0 - (far - inner) ** 2 / np.maximum(2 * a * b, np.float32(1e-12))
+    inner = np.minimum(np.abs(distance), far)
+    band = 0.5 + inner / np.maximum(np.maximum(a, b), _TINY)
+    corner = 1.0 - (far - inner) ** 2 / np.maximum(2 * a * b, _TINY)
     area = np.where(inner >= far, 1.0, np.where(inner <= near, band, corner))
     return np.where(distance >= 0, area, 1 - area).astype(np.float32)

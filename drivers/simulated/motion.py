@@ -79,11 +79,11 @@ def trapezoid(start: float, target: float, t: float, velocity: float, accelerati
     The velocity rises and falls linearly, with a plateau where the distance allows for one.
     """
     distance = abs(target - start)
-    if distance == 0.0:
-        return rest(target, t)
-    sign = math.copysign(1.0, target - start)
     peak = min(velocity, math.sqrt(distance * acceleration))
     ramp = peak / acceleration
+    if t + ramp == t:
+        return rest(target, t)  # a distance too short to take any time
+    sign = math.copysign(1.0, target - start)
     cruise = max(0.0, distance / peak - ramp)
     rise = Phase(t, start, 0.0, sign * acceleration)
     plateau = Phase(t + ramp, start + sign * 0.5 * peak * ramp, sign * peak, 0.0)
