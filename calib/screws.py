@@ -20,6 +20,9 @@ Ints = NDArray[np.intp]
 HUBER = 1.345
 HUBER_PASSES = 12
 CHI_MEDIAN = {1: 0.6745, 2: 1.1774}
+HALF_A_TURN = 0.98 * np.pi
+UNEVEN = 0.3
+"""How far (rad) a turn may be from what the other readings say of it: more than any noise, less than a mistake."""
 MAX_STRIDES = 48
 """In a sweep of more views than this, pairs are taken at this many distances along it."""
 
@@ -105,16 +108,18 @@ def _turning_rate(poses: Array, readings: Array, sweeps: Ints, name: str, unit: 
     """Return the rotation vector per reading (3,), from neighbouring readings less than half a turn apart."""
     first, second = _neighbours(readings, sweeps)
     step = readings[second] - readings[first]
-    advice = (
-        f"neighbouring views of joint '{name}' must be less than half a turn apart, "
-        "or the angle between them cannot be decided: take views in between"
-    )
-    if unit is not None and unit * step.max() > 0.98 * np.pi:
-        raise UnsolvableError(advice)
+    if unit is not None and unit * step.max() > HALF_A_TURN:
+        raise UnsolvableError(
+            f"neighbouring views of joint '{name}' must be less than half a turn apart, "
+            "or the angle between them cannot be decided: take views in between"
+        )
     turn = rotation_log(poses[second, :3, :3] @ np.swapaxes(poses[first, :3, :3], -1, -2))
     rate = np.asarray(step @ turn / (step @ step), dtype=float)
-    if np.linalg.norm(turn - step[:, None] * rate, axis=1).max() > np.pi / 2:
-        raise UnsolvableError(advice)
+    if np.linalg.norm(turn - step[:, None] * rate, axis=1).max() > UNEVEN:
+        raise UnsolvableError(
+            f"the camera's turns between neighbouring views of joint '{name}' do not grow with its readings: "
+            "these must be less than half a turn apart, so take views in between, or look for wrong readings"
+        )
     return rate
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from calib.calibration import Calibration
 from calib.closed_form import PoseViews
@@ -90,9 +91,7 @@ class Verification:
     warnings: list[str]
 
 
-def verify(
-    calibration: Calibration, session: Session, progress: Progress | None = None
-) -> Verification:
+def verify(calibration: Calibration, session: Session, progress: Progress | None = None) -> Verification:
     """Judge `calibration` on the views of `session`: those marked `verify`, or all where none is.
 
     Raises FormatError where the session's joints or cameras are not the calibration's, UnsolvableError
@@ -198,3 +197,7 @@ def _moved(kind: JointKind, start: Array, end: Array, expected: float) -> float:
 
 def _spread(errors: Sequence[float]) -> Spread:
     return Spread(mean=float(np.mean(errors)), max=float(np.max(errors)))
+
+
+VERIFICATION: TypeAdapter[Verification] = TypeAdapter(Verification)
+"""Reads a verification back from the JSON value that it was written as."""

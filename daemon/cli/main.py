@@ -1,7 +1,7 @@
 """The `activecam` command: errors become one sentence on stderr and an exit status of 1 or 2."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import metadata
 from typing import Annotated
 
@@ -36,7 +36,7 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 def activecam(
-    version: Annotated[  # noqa: ARG001 typer calls _print_version with it
+    version: Annotated[
         bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
     ] = False,
 ) -> None:
@@ -58,26 +58,27 @@ def _run(arguments: list[str]) -> int:
     try:
         # Without click's own handling a command's return value comes back instead of an exit.
         status = app(arguments, standalone_mode=False)
-    except UsageError as error:
-        context = getattr(error, "ctx", None)
-        where = "activecam" if context is None else context.command_path
-        return _fail(f"{_sentence(error)}; see '{where} --help'", WRONG_CALL)
-    except ClickError as error:
-        return _fail(_sentence(error), COULD_NOT)
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
-    except ReadingsError as error:
-        return _fail(str(error), WRONG_CALL)
-    except DaemonError as error:
-        return _fail(str(error), error.exit_status)
-    except (CalibError, DriverError, ProfileError) as error:
-        return _fail(str(error), COULD_NOT)
     except BrokenPipeError:
         return COULD_NOT
-    except OSError as error:
-        what = f"{error.filename}: " if error.filename else ""
-        return _fail(f"{what}{error.strerror or error}", COULD_NOT)
+    except Exception as error:
+        for kind, status, sentence in FAILURES:
+            if isinstance(error, kind):
+                return _fail(sentence(error), status)
+        raise
     return status if isinstance(status, int) else 0
+
+
+def _fail(sentence: str, status: int) -> int:
+    errors.print(f"activecam: {sentence}", markup=False, highlight=False, soft_wrap=True)
+    return status
+
+
+def _wrong_call(error: Exception) -> str:
+    context = getattr(error, "ctx", None)
+    where = "activecam" if context is None else context.command_path
+    return f"{_sentence(error)}; see '{where} --help'"
 
 
 def _sentence(error: Exception) -> str:
@@ -86,9 +87,23 @@ def _sentence(error: Exception) -> str:
     return (message[:1].lower() + message[1:]).rstrip(".")
 
 
-def _fail(sentence: str, status: int) -> int:
-    errors.print(f"activecam: {sentence}", markup=False, highlight=False, soft_wrap=True)
-    return status
+def _system(error: Exception) -> str:
+    """Return what the operating system said, and of which file."""
+    assert isinstance(error, OSError)
+    return f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
+
+
+FAILURES: tuple[tuple[type[Exception], int, Callable[[Exception], str]], ...] = (
+    (UsageError, WRONG_CALL, _wrong_call),
+    (ClickError, COULD_NOT, _sentence),
+    (ReadingsError, WRONG_CALL, str),
+    (CalibError, COULD_NOT, str),
+    (DriverError, COULD_NOT, str),
+    (DaemonError, COULD_NOT, str),
+    (ProfileError, COULD_NOT, str),
+    (OSError, COULD_NOT, _system),
+)
+"""What each kind of error ends a command with; the first that fits."""
 
 
 def spread_readings(arguments: list[str]) -> list[str]:

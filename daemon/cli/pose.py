@@ -16,9 +16,7 @@ from daemon.cli.console import warn
 Readings = Annotated[
     list[float] | None, typer.Option("--readings", help="One number a joint, in its reading unit.")
 ]
-ReadingsFile = Annotated[
-    Path | None, typer.Option("--readings-file", help="A JSON list of such lists.")
-]
+ReadingsFile = Annotated[Path | None, typer.Option("--readings-file", help="A JSON list of such lists.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -45,7 +43,9 @@ def pose(
 def wanted_readings(readings: list[float] | None, file: Path | None, joints: list[str]) -> list[list[float]]:
     """Return the readings asked for on the command line, one vector each; raises ReadingsError."""
     if (readings is None) == (file is None):
-        raise ReadingsError(f"give either --readings (one number each for {', '.join(joints)}) or --readings-file")
+        raise ReadingsError(
+            f"give either --readings (one number each for {', '.join(joints)}) or --readings-file"
+        )
     vectors = [readings] if file is None else read_json(file)
     if not isinstance(vectors, list) or not all(isinstance(vector, list) for vector in vectors):
         raise ReadingsError(f"{file}: must be a JSON list of lists of readings, such as [[12.5, 30]]")
@@ -53,7 +53,8 @@ def wanted_readings(readings: list[float] | None, file: Path | None, joints: lis
         numbers = all(isinstance(value, int | float) and np.isfinite(value) for value in vector)
         if len(vector) != len(joints) or not numbers:
             raise ReadingsError(
-                f"readings {vector} are not one finite number each for the {len(joints)} joints ({', '.join(joints)})"
+                f"readings {vector} are not one finite number for each of the {len(joints)} joints "
+                f"({', '.join(joints)})"
             )
     return [[float(value) for value in vector] for vector in vectors]
 

@@ -46,7 +46,9 @@ def _description(profile: Profile) -> str:
         low, high = axis.spec.limits
         lines.append(f"  axis '{axis.spec.name}', {axis.spec.kind}, {low:g} to {high:g} {axis.spec.unit}")
     camera = profile.camera.spec
-    lines.append(f"  camera '{camera.name}', {camera.width} x {camera.height}, target '{profile.target.kind}'")
+    lines.append(
+        f"  camera '{camera.name}', {camera.width} x {camera.height}, target '{profile.target.kind}'"
+    )
     planned = sum(len(sweep.readings) for sweep in profile.procedure.sweeps) + len(profile.procedure.views)
     lines.append(f"  {planned} views in the procedure")
     return "\n".join(lines)

@@ -25,9 +25,9 @@ def register(app: typer.Typer) -> None:
 
 def solve(
     session: Annotated[Path, typer.Argument(help="The session's folder, or its session.json.")],
-    result: Annotated[
-        Path, typer.Option("--output", "-o", help="Where to write the calibration.")
-    ] = Path("calibration.json"),
+    result: Annotated[Path, typer.Option("--output", "-o", help="Where to write the calibration.")] = Path(
+        "calibration.json"
+    ),
     method: Annotated[Method, typer.Option(help="How to solve.")] = Method.closed_form,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON.")] = False,
 ) -> None:
@@ -55,7 +55,11 @@ def _keep_origin(session: Session, calibration: Calibration) -> None:
     """
     from calib.documents import write_json
 
-    if session.origin is not None or calibration.origin is None or len(calibration.joints) < len(session.joints):
+    if (
+        session.origin is not None
+        or calibration.origin is None
+        or len(calibration.joints) < len(session.joints)
+    ):
         return
     try:
         write_json(session.folder / "session.json", session.model_copy(update={"origin": calibration.origin}))
@@ -83,12 +87,16 @@ def print_calibration(calibration: Calibration) -> None:
     for camera in calibration.cameras:
         lens = camera.intrinsics
         values = [] if lens is None else [f"{value:.2f}" for value in (lens.fx, lens.fy, lens.cx, lens.cy)]
-        lenses.add_row(camera.name, camera.link or "nothing", "given poses" if lens is None else lens.model, *values)
+        lenses.add_row(
+            camera.name, camera.link or "nothing", "given poses" if lens is None else lens.model, *values
+        )
     if calibration.joints:
         output.print(joints)
     output.print(lenses)
     quality = calibration.quality
     if quality.rms_px is not None:
-        output.print(f"Residual of the fit: {quality.rms_px:.3f} px rms (small residuals alone do not say good)")
+        output.print(
+            f"Residual of the fit: {quality.rms_px:.3f} px rms (small residuals alone do not say good)"
+        )
     if quality.held_out_rms_px is not None:
         output.print(f"Prediction of held-out views: {quality.held_out_rms_px:.3f} px rms")

@@ -16,7 +16,9 @@ def register(app: typer.Typer) -> None:
 
 
 def truth(
-    profile: Annotated[str, typer.Argument(help="A simulated rig's profile: a file, or a shipped one's name.")],
+    profile: Annotated[
+        str, typer.Argument(help="A simulated rig's profile: a file, or a shipped one's name.")
+    ],
     readings: Readings = None,
     readings_file: ReadingsFile = None,
 ) -> None:

@@ -29,42 +29,42 @@ def print_verification(verdict: Verification) -> None:
 def travel_table(travel: JointTravel) -> Table:
     """Return method 1 of one joint: how far it moved, predicted against measured (tables 1 and 2)."""
     straight = travel.kind == "prismatic"
-    unit, show = ("mm", 1e3) if straight else ("mrad", 1e3)
+    unit, coarse = ("mm", "mm") if straight else ("mrad", "deg")
     theirs = (
-        zip(paper.TRANSLATION_M, paper.TRANSLATION_ERROR_M, strict=True)
+        zip(paper.TRANSLATION_M, paper.TRANSLATION_ERROR_M, paper.TRANSLATION_PERCENT, strict=True)
         if straight
-        else zip(paper.ROTATION_RAD, paper.ROTATION_ERROR_RAD, strict=True)
+        else zip(paper.ROTATION_RAD, paper.ROTATION_ERROR_RAD, paper.ROTATION_PERCENT, strict=True)
     )
     number = 1 if straight else 2
     table = Table(
-        title=f"Method 1, joint '{travel.joint}': predicted travel against the pictures' own (paper: table {number})",
+        title=f"Method 1, joint '{travel.joint}': predicted against measured travel (paper: table {number})",
         title_justify="left",
     )
     trusted = any(row.encoder is not None for row in travel.rows)
-    table.add_column(f"travel ({'mm' if straight else 'deg'})", justify="right")
+    table.add_column(f"travel ({coarse})", justify="right")
     table.add_column(f"error to pictures ({unit})", justify="right")
     table.add_column("%", justify="right")
     if trusted:
         table.add_column(f"error to encoder ({unit})", justify="right")
         table.add_column("%", justify="right")
-    table.add_column(f"paper: travel ({'mm' if straight else 'deg'})", justify="right", style="dim")
+    table.add_column(f"paper: travel ({coarse})", justify="right", style="dim")
     table.add_column(f"error ({unit})", justify="right", style="dim")
     table.add_column("%", justify="right", style="dim")
     for row, reported in zip_longest(travel.rows, theirs):
-        cells = _travel_cells(row, straight, show, trusted)
+        cells = _travel_cells(row, straight, trusted)
         if reported is not None:
-            distance, error = reported
-            cells += [_travelled(distance, straight), f"{show * error:.4f}", f"{100 * error / distance:.4f}"]
+            distance, error, percent = reported
+            cells += [_travelled(distance, straight), f"{1e3 * error:.4f}", f"{percent:.4f}"]
         table.add_row(*cells)
     return table
 
 
-def _travel_cells(row: Travel | None, straight: bool, show: float, trusted: bool) -> list[str]:
+def _travel_cells(row: Travel | None, straight: bool, trusted: bool) -> list[str]:
     if row is None:
         return [""] * (5 if trusted else 3)
-    cells = [_travelled(row.predicted, straight), *_error_cells(row.predicted, row.measured, show)]
+    cells = [_travelled(row.predicted, straight), *_error_cells(row.predicted, row.measured)]
     if trusted:
-        cells += ["", ""] if row.encoder is None else _error_cells(row.predicted, row.encoder, show)
+        cells += ["", ""] if row.encoder is None else _error_cells(row.predicted, row.encoder)
     return cells
 
 
@@ -72,9 +72,10 @@ def _travelled(travel: float, straight: bool) -> str:
     return f"{1e3 * travel:.1f}" if straight else f"{degrees(travel):.2f}"
 
 
-def _error_cells(predicted: float, measured: float, show: float) -> list[str]:
+def _error_cells(predicted: float, measured: float) -> list[str]:
+    """Return the error in mm or mrad, and in percent."""
     error = abs(predicted - measured)
-    return [f"{show * error:.4f}", f"{100 * error / abs(measured):.4f}" if measured else ""]
+    return [f"{1e3 * error:.4f}", f"{100 * error / abs(measured):.4f}" if measured else ""]
 
 
 def prediction_table(joint: str, kind: str, views: list[ViewVerdict]) -> Table:
@@ -105,12 +106,12 @@ def summary(verdict: Verification) -> str:
     parts = []
     if verdict.mean_px is not None:
         parts.append(
-            f"points {verdict.mean_px:.3f} px mean, {verdict.rms_px:.3f} px rms, {verdict.max_px:.3f} px at most"
+            f"points {verdict.mean_px:.3f} px mean, {verdict.rms_px:.3f} px rms, {verdict.max_px:.3f} px max"
         )
     if verdict.position_m is not None:
-        parts.append(f"position {1e3 * verdict.position_m.mean:.3f} mm mean, {1e3 * verdict.position_m.max:.3f} mm at most")
+        position = verdict.position_m
+        parts.append(f"position {1e3 * position.mean:.3f} mm mean, {1e3 * position.max:.3f} mm max")
     if verdict.rotation_rad is not None:
-        parts.append(
-            f"rotation {1e3 * verdict.rotation_rad.mean:.3f} mrad mean, {1e3 * verdict.rotation_rad.max:.3f} mrad at most"
-        )
+        rotation = verdict.rotation_rad
+        parts.append(f"rotation {1e3 * rotation.mean:.3f} mrad mean, {1e3 * rotation.max:.3f} mrad max")
     return f"Prediction of {verdict.views} views: {'; '.join(parts)}"

@@ -1,0 +1,73 @@
+"""A session that was cut off is solved as far as it goes; a complete one with too little is refused."""
+
+import numpy as np
+import pytest
+
+from calib import solve
+from calib.errors import UnsolvableError
+from calib.session import Session
+from tests.calib.rigs import pose_session, random_rig
+
+RIG = random_rig(np.random.default_rng(11), ["prismatic", "revolute"], ["skew"])
+SLIDE = [("j0", np.array([s, 0.2]) / RIG.scales) for s in np.linspace(0, 1, 6)]
+PAN = [("j1", np.array([0.5, 0.2 + s]) / RIG.scales) for s in np.linspace(0, 1, 6)]
+
+
+def cut_off(count: int) -> Session:
+    return pose_session(RIG, (SLIDE + PAN)[:count], complete=False)
+
+
+@pytest.mark.parametrize("count", [2, 4, 6, 7])
+def test_the_finished_joint_is_solved(count: int) -> None:
+    calibration = solve(cut_off(count))
+    assert [joint.name for joint in calibration.joints] == ["j0"]
+    assert "joint 'j1' was not exercised and counts as fixed" in calibration.quality.warnings[0]
+    predicted = calibration.world_from_camera([0.7 / RIG.scales[0]])
+    assert np.allclose(predicted, RIG.pose(np.array([0.7, 0.2]) / RIG.scales), atol=1e-8)
+
+
+def test_all_joints_once_they_are_begun() -> None:
+    calibration = solve(cut_off(8))
+    assert [joint.name for joint in calibration.joints] == ["j0", "j1"]
+    assert not calibration.quality.warnings
+    assert np.allclose(calibration.world_from_camera(PAN[5][1]), RIG.pose(PAN[5][1]), atol=1e-8)
+
+
+def test_the_second_joint_first() -> None:
+    calibration = solve(pose_session(RIG, PAN, complete=False))
+    assert [joint.name for joint in calibration.joints] == ["j1"]
+    assert np.allclose(calibration.world_from_camera(PAN[5][1][1:]), RIG.pose(PAN[5][1]), atol=1e-8)
+
+
+def test_nothing_to_solve_yet() -> None:
+    with pytest.raises(UnsolvableError, match="cut off after 1 views"):
+        solve(cut_off(1))
+
+
+@pytest.mark.parametrize(
+    ("views", "sentence"),
+    [
+        (SLIDE, "joint 'j1' was never moved alone"),
+        ([*SLIDE, PAN[0]], "joint 'j1' has one view only"),
+        ([*SLIDE, PAN[0], PAN[0]], "joint 'j1' has 2 views, but no two from one start"),
+    ],
+)
+def test_a_complete_session_must_have_all_joints(views: list[tuple[str, np.ndarray]], sentence: str) -> None:
+    with pytest.raises(UnsolvableError, match=sentence):
+        solve(pose_session(RIG, views))
+
+
+def test_steps_of_half_a_turn_are_refused() -> None:
+    rig = random_rig(np.random.default_rng(1), ["revolute"], [])
+    wide = [("j0", np.array([angle]) / rig.scales) for angle in (0.0, 0.5, 1.0, 5.5)]
+    with pytest.raises(UnsolvableError, match="less than half a turn apart, so take views in between"):
+        solve(pose_session(rig, wide))
+
+
+def test_a_joint_that_did_not_turn_is_refused() -> None:
+    rig = random_rig(np.random.default_rng(1), ["revolute"], [])
+    views = [("j0", np.array([0.0])), ("j0", np.array([1.0]))]
+    session = pose_session(rig, views)
+    still = session.views[1].model_copy(update={"world_from_camera": session.views[0].world_from_camera})
+    with pytest.raises(UnsolvableError, match="did not turn"):
+        solve(session.with_views([session.views[0], still]))
