@@ -106,6 +106,14 @@ class PictureOptions(DriverOptions):
     light_gradient: Annotated[float, Field(gt=-1, lt=1)] = 0.0
     """Relative change of the light from the picture's centre to its right edge."""
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.exposure * self.frame_rate > 1:
+            raise ValueError(
+                "'exposure' is longer than the time between frames: shorten it or lower 'frame_rate'"
+            )
+        return self
+
 
 class CameraTruth(DriverOptions):
     """The true camera: its pose at all displacements 0, given by `look_at` or by `rotation`, and its lens."""
