@@ -1,0 +1,134 @@
+"""What the daemon can refuse or fail at, as one tree.
+
+    DaemonError
+    ├── RigError
+    │   ├── UnknownAxisError (KeyError)        no axis of this name
+    │   ├── StopLatchedError                   a stop has not been acknowledged: nothing may move
+    │   ├── RigFaultError                      the rig is in fault: a run cannot start
+    │   └── StandstillError                    axes that could not be confirmed to stand
+    ├── LeaseError
+    │   ├── LeaseRequiredError                 a motion asked without a lease
+    │   ├── LeaseEndedError                    a motion asked with a lease that is over
+    │   └── LeaseHeldError                     somebody else may move; the message says who
+    ├── RunError
+    │   ├── UnknownRunError (KeyError)         no run of this id
+    │   ├── RunActiveError                     one run at a time, and one is under way
+    │   ├── RunStateError                      the run is not in a state in which this can be asked
+    │   └── TargetUnseenError                  the views that a run got are too few to go on
+    ├── PoseError
+    │   ├── NotCalibratedError                 no calibration is active
+    │   ├── CalibrationMismatchError           the calibration is of another chain than the rig's
+    │   ├── StaleReadingError                  the latest reading is too old to answer with
+    │   ├── LensUnknownError                   the calibration does not know the camera's lens
+    │   └── UnknownCameraError (KeyError)      no camera of this name in the calibration
+    ├── StoreError                             the database or its folder cannot be used
+    │   └── UnknownCalibrationError (KeyError) no calibration of this id
+    └── ServeError                             the address cannot be served
+
+Every message is one sentence that says what happened and what to do.
+"""
+
+from typing import ClassVar
+
+
+class DaemonError(Exception):
+    """The daemon could not do what was asked of it."""
+
+    exit_status: ClassVar[int] = 1
+    """What the command line exits with when this ends a command."""
+
+    def __str__(self) -> str:
+        # KeyError quotes its message; a sentence is to be read as it is.
+        return str(self.args[0]) if self.args else ""
+
+
+class RigError(DaemonError):
+    """The rig as a whole cannot do this now."""
+
+
+class UnknownAxisError(RigError, KeyError):
+    """The rig has no axis of this name."""
+
+
+class StopLatchedError(RigError):
+    """A stop is latched: nothing moves before somebody acknowledges it."""
+
+
+class RigFaultError(RigError):
+    """A device is lost or in fault, so that a run cannot be started."""
+
+
+class StandstillError(RigError):
+    """A stop was sent, and some axis could not be confirmed to stand; the message says which and why."""
+
+
+class LeaseError(DaemonError):
+    """Who may move is not who asked."""
+
+
+class LeaseRequiredError(LeaseError):
+    """A motion was asked without a lease."""
+
+
+class LeaseEndedError(LeaseError):
+    """The lease that was shown is unknown, released or expired."""
+
+
+class LeaseHeldError(LeaseError):
+    """Another client, or a run, holds the lease."""
+
+
+class RunError(DaemonError):
+    """A calibration run cannot be started, steered or finished."""
+
+
+class UnknownRunError(RunError, KeyError):
+    """There is no run of this id."""
+
+
+class RunActiveError(RunError):
+    """A run is under way, and there is one at a time."""
+
+
+class RunStateError(RunError):
+    """The run is over, or already in the state that was asked for."""
+
+
+class TargetUnseenError(RunError):
+    """The target was found at too few positions of a sweep for its joint to be determined."""
+
+
+class PoseError(DaemonError):
+    """The camera's pose cannot be given."""
+
+
+class NotCalibratedError(PoseError):
+    """No calibration is active."""
+
+
+class CalibrationMismatchError(PoseError):
+    """The calibration's joints are not the axes of this rig."""
+
+
+class StaleReadingError(PoseError):
+    """The latest reading is older than the profile allows, or there is none yet."""
+
+
+class LensUnknownError(PoseError):
+    """The active calibration knows where the camera is, but not its lens."""
+
+
+class UnknownCameraError(PoseError, KeyError):
+    """The active calibration has no camera of this name."""
+
+
+class StoreError(DaemonError):
+    """The database, or the folder it is in, cannot be used."""
+
+
+class UnknownCalibrationError(StoreError, KeyError):
+    """There is no calibration of this id."""
+
+
+class ServeError(DaemonError):
+    """The daemon cannot listen where it was asked to."""
