@@ -1,0 +1,13 @@
+"""The rig: devices and their owners, the snapshot that everybody reads, and the stop that nothing holds up.
+
+devices           profile -> drivers, clock, simulated world
+device_owner      connecting, losing and finding a device;  controller_owner, camera_owner  the two kinds
+snapshot          what is known at one instant
+stop_latch        nothing moves after a stop before it is acknowledged
+rig               all of it together
+"""
+
+from daemon.rig.rig import Rig
+from daemon.rig.snapshot import AxisSnapshot, DeviceSnapshot, RigSnapshot
+
+__all__ = ["AxisSnapshot", "DeviceSnapshot", "Rig", "RigSnapshot"]

@@ -1,0 +1,52 @@
+"""From a profile to its devices: drivers by name, their clock, and the world behind simulated ones."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from daemon.profile import Profile
+from drivers.axis import AxisController
+from drivers.camera import CameraSource
+from drivers.clock import Clock, ScaledClock, SystemClock
+from drivers.driver import DriverContext
+from drivers.registry import camera_driver, controller_driver
+
+if TYPE_CHECKING:
+    from drivers.simulated.world import SimulatedWorld
+
+
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """Everything a rig is made of; nothing is open yet."""
+
+    clock: Clock
+    world: "SimulatedWorld | None"
+    controllers: Mapping[str, AxisController]
+    camera: CameraSource
+
+
+def make_devices(profile: Profile) -> Devices:
+    """Make the devices of `profile`. Raises OptionsError where a driver cannot do what the profile asks."""
+    context = _context(profile)
+    controllers = {}
+    for name, controller in profile.controllers.items():
+        axes = [axis for axis in profile.axes if axis.controller == name]
+        controllers[name] = controller_driver(controller.driver).create(
+            {axis.spec.name: axis.spec for axis in axes},
+            controller.options,
+            {axis.spec.name: axis.options for axis in axes},
+            context,
+        )
+    camera = camera_driver(profile.camera.driver).create(profile.camera.spec, profile.camera.options, context)
+    return Devices(context.clock, context.world, controllers, camera)
+
+
+def _context(profile: Profile) -> DriverContext:
+    if profile.simulation is None:
+        return DriverContext(SystemClock())
+    from drivers.simulated.world import SimulatedWorld
+
+    clock = ScaledClock(profile.simulation.time_scale)
+    specs = [axis.spec for axis in profile.axes]
+    target = profile.target.model_dump()
+    return DriverContext(clock, SimulatedWorld(profile.simulation, specs, target, clock))

@@ -1,0 +1,32 @@
+"""The latch of the stop: once engaged, nothing moves before a person has said that they know."""
+
+from datetime import UTC, datetime
+
+from daemon.errors import StopLatchedError
+
+
+class StopLatch:
+    """Engaged or not, since when and why. It begins free, as a daemon begins with all axes still."""
+
+    def __init__(self) -> None:
+        self.reason: str | None = None
+        self.since: datetime | None = None
+
+    @property
+    def engaged(self) -> bool:
+        """Whether a stop waits to be acknowledged."""
+        return self.reason is not None
+
+    def engage(self, reason: str) -> None:
+        """Refuse all motion from now on; the first reason stays until it is acknowledged."""
+        if self.reason is None:
+            self.reason, self.since = reason, datetime.now(UTC)
+
+    def acknowledge(self) -> None:
+        """Allow motion again."""
+        self.reason = self.since = None
+
+    def require_free(self) -> None:
+        """Raise StopLatchedError while engaged."""
+        if self.reason is not None:
+            raise StopLatchedError(f"nothing may move: {self.reason}; acknowledge the stop first")
