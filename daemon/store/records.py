@@ -1,0 +1,62 @@
+"""What the store gives out: records that no longer touch the database."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+
+
+class RunState(StrEnum):
+    """Where a run stands."""
+
+    RUNNING = "running"
+    PAUSED = "paused"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def over(self) -> bool:
+        """Whether it will not change any more."""
+        return self not in {RunState.RUNNING, RunState.PAUSED}
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A calibration run as it is stored."""
+
+    id: str
+    state: RunState
+    profile_name: str
+    profile: str
+    """The profile's document (JSON) when the run was created."""
+    session: str
+    """The session's folder, from the data folder."""
+    owner: str
+    note: str
+    created_at: datetime
+    started_at: datetime | None = None
+    ended_at: datetime | None = None
+    error: str | None = None
+    calibration_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationSummary:
+    """A stored calibration without its document."""
+
+    id: str
+    created_at: datetime
+    method: str
+    active: bool
+    run_id: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRecord(CalibrationSummary):
+    """A stored calibration."""
+
+    document: str
+    """The calibration's JSON."""
+    verification: str | None = None
+    """What the held-out views said (JSON), None where there were none."""

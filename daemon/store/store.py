@@ -1,0 +1,181 @@
+"""Runs and calibrations, kept for good under the data folder."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Self
+
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from daemon.errors import UnknownCalibrationError, UnknownRunError
+from daemon.store.database import Database
+from daemon.store.records import CalibrationRecord, CalibrationSummary, RunRecord, RunState
+from daemon.store.tables import CalibrationRow, RunRow
+
+
+class Store:
+    """The database and the session folders beside it. Every method raises StoreError when the disk fails."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    @classmethod
+    async def open(cls, folder: Path) -> Self:
+        """Open or create what is stored in `folder`; see `Database.open`."""
+        return cls(await Database.open(folder))
+
+    async def close(self) -> None:
+        """Let the database go."""
+        await self._database.close()
+
+    def session_folder(self, run: RunRecord) -> Path:
+        """Return where the session of `run` is."""
+        return self._database.folder / run.session
+
+    async def interrupt_unfinished(self) -> list[RunRecord]:
+        """Mark the runs that an earlier daemon left unfinished, and return them."""
+        now = datetime.now(UTC)
+
+        def work(session: Session) -> list[RunRecord]:
+            rows = session.scalars(select(RunRow).where(RunRow.state.in_(["running", "paused"]))).all()
+            for row in rows:
+                row.state, row.ended_at = RunState.INTERRUPTED, now
+                row.error = (
+                    "the daemon ended while this run was under way: "
+                    "the views taken so far can be solved as they are"
+                )
+            return [_run(row) for row in rows]
+
+        return await self._database.transact(work)
+
+    async def add_run(self, run: RunRecord) -> None:
+        """Store a new run."""
+
+        def work(session: Session) -> None:
+            fields = {name: getattr(run, name) for name in RunRecord.__dataclass_fields__}
+            session.add(RunRow(**fields | {"state": run.state.value}))
+
+        await self._database.transact(work)
+
+    async def change_run(
+        self,
+        run_id: str,
+        state: RunState,
+        error: str | None = None,
+        *,
+        calibration: CalibrationRecord | None = None,
+    ) -> RunRecord:
+        """Move a run to `state`; a `calibration` is stored and activated in the same transaction."""
+
+        def work(session: Session) -> RunRecord:
+            row = _find_run(session, run_id)
+            row.state, row.error = state.value, error
+            row.ended_at = datetime.now(UTC) if state.over else None
+            if calibration is not None:
+                _add_active(session, calibration)
+                row.calibration_id = calibration.id
+            return _run(row)
+
+        return await self._database.transact(work)
+
+    async def run(self, run_id: str) -> RunRecord:
+        """Return one run; raises UnknownRunError."""
+        return await self._database.transact(lambda session: _run(_find_run(session, run_id)))
+
+    async def runs(self) -> Sequence[RunRecord]:
+        """Return all runs, the newest first."""
+        newest_first = select(RunRow).order_by(RunRow.created_at.desc(), RunRow.id.desc())
+        return await self._database.transact(
+            lambda session: [_run(row) for row in session.scalars(newest_first)]
+        )
+
+    async def calibrations(self) -> Sequence[CalibrationSummary]:
+        """Return all calibrations without their documents, the newest first."""
+        columns = select(
+            CalibrationRow.id,
+            CalibrationRow.created_at,
+            CalibrationRow.method,
+            CalibrationRow.active,
+            CalibrationRow.run_id,
+        ).order_by(CalibrationRow.created_at.desc(), CalibrationRow.id.desc())
+        return await self._database.transact(
+            lambda session: [CalibrationSummary(*row) for row in session.execute(columns)]
+        )
+
+    async def calibration(self, calibration_id: str) -> CalibrationRecord:
+        """Return one calibration; raises UnknownCalibrationError."""
+        return await self._database.transact(
+            lambda session: _calibration(_find_calibration(session, calibration_id))
+        )
+
+    async def active_calibration(self) -> CalibrationRecord | None:
+        """Return the calibration that poses are computed from, None where there is none."""
+
+        def work(session: Session) -> CalibrationRecord | None:
+            row = session.scalars(select(CalibrationRow).where(CalibrationRow.active)).one_or_none()
+            return None if row is None else _calibration(row)
+
+        return await self._database.transact(work)
+
+    async def activate(self, calibration_id: str) -> CalibrationRecord:
+        """Make one calibration the active one; raises UnknownCalibrationError."""
+
+        def work(session: Session) -> CalibrationRecord:
+            row = _find_calibration(session, calibration_id)
+            _deactivate_all(session)
+            row.active = True
+            session.flush()
+            return _calibration(row)
+
+        return await self._database.transact(work)
+
+
+def _add_active(session: Session, calibration: CalibrationRecord) -> None:
+    _deactivate_all(session)
+    fields = {name: getattr(calibration, name) for name in CalibrationRecord.__dataclass_fields__}
+    session.add(CalibrationRow(**fields | {"active": True}))
+    session.flush()  # before the run that refers to it
+
+
+def _deactivate_all(session: Session) -> None:
+    session.execute(update(CalibrationRow).where(CalibrationRow.active).values(active=False))
+
+
+def _find_run(session: Session, run_id: str) -> RunRow:
+    row = session.get(RunRow, run_id)
+    if row is None:
+        raise UnknownRunError(f"there is no run '{run_id}': GET /api/v1/runs lists those that there are")
+    return row
+
+
+def _find_calibration(session: Session, calibration_id: str) -> CalibrationRow:
+    row = session.get(CalibrationRow, calibration_id)
+    if row is None:
+        raise UnknownCalibrationError(
+            f"there is no calibration '{calibration_id}': GET /api/v1/calibrations lists those that there are"
+        )
+    return row
+
+
+def _run(row: RunRow) -> RunRecord:
+    return RunRecord(
+        row.id,
+        RunState(row.state),
+        row.profile_name,
+        row.profile,
+        row.session,
+        row.owner,
+        row.note,
+        row.created_at,
+        row.started_at,
+        row.ended_at,
+        row.error,
+        row.calibration_id,
+    )
+
+
+def _calibration(row: CalibrationRow) -> CalibrationRecord:
+    return CalibrationRecord(
+        row.id, row.created_at, row.method, row.active, row.run_id, row.document, row.verification
+    )

@@ -1,0 +1,68 @@
+"""The tables of the database. Times are in UTC; documents are JSON texts, kept as they were written."""
+
+from datetime import UTC, datetime
+from typing import Final
+
+from sqlalchemy import DateTime, Dialect, ForeignKey, Index, Text, TypeDecorator, text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+SCHEMA_VERSION: Final = 1
+"""Kept in SQLite's `user_version`: what a migration has to start from."""
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """A time that goes in and comes out with its zone, which SQLite does not keep."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+        """Store in UTC."""
+        return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+        """Say that it is UTC."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Table(DeclarativeBase):
+    """Base of the tables."""
+
+    type_annotation_map = {datetime: UtcDateTime, str: Text}  # noqa: RUF012  SQLAlchemy reads it so
+
+
+class RunRow(Table):
+    """A calibration run."""
+
+    __tablename__ = "runs"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    state: Mapped[str]
+    profile_name: Mapped[str]
+    profile: Mapped[str]
+    """The profile as it was when the run was created."""
+    session: Mapped[str]
+    """The session's folder, from the data folder."""
+    owner: Mapped[str]
+    note: Mapped[str]
+    created_at: Mapped[datetime]
+    started_at: Mapped[datetime | None]
+    ended_at: Mapped[datetime | None]
+    error: Mapped[str | None]
+    calibration_id: Mapped[str | None] = mapped_column(ForeignKey("calibrations.id"))
+
+
+class CalibrationRow(Table):
+    """A calibration; its document is never changed."""
+
+    __tablename__ = "calibrations"
+    __table_args__ = (Index("one_active_calibration", "active", unique=True, sqlite_where=text("active")),)
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    created_at: Mapped[datetime]
+    method: Mapped[str]
+    document: Mapped[str]
+    verification: Mapped[str | None]
+    """What the held-out views said, as JSON."""
+    active: Mapped[bool]
+    run_id: Mapped[str | None]
