@@ -1,0 +1,16 @@
+"""The calibration run: measured, solved, verified, stored and activated, and told as events.
+
+In the order in which a run goes:
+
+    manager       one run at a time, under its own lease
+    run           its states, from its start to its last word;  gate  where it waits while paused
+    survey        homing, sweeps and free views;  observation  one view;  approach  from which side axes came
+    conclusion    solving and verification
+    events        what it tells;  event_log  told in order, kept, followed
+"""
+
+from daemon.procedure.events import RunEvent
+from daemon.procedure.manager import RunManager
+from daemon.procedure.run import Run
+
+__all__ = ["Run", "RunEvent", "RunManager"]

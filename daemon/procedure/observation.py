@@ -1,0 +1,111 @@
+"""One view: go there, stand, settle, take a frame exposed after that, and find the target in it."""
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from calib.detection import detect
+from calib.errors import DetectionError
+from daemon.procedure.approach import Approach, Side
+from daemon.rig import Rig, RigSnapshot
+from drivers.camera import Frame
+from drivers.errors import MotionError
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """A picture in which the target was found, and the readings (chain order) at which it was taken."""
+
+    frame: Frame
+    readings: list[float]
+    approached: list[Side]
+    points: int
+    taken_at: datetime
+    settled: float
+    """Seconds of the rig's clock between the confirmed standstill and the exposure."""
+
+    def view_fields(self) -> dict[str, Any]:
+        """Return what the view keeps of it beside the picture."""
+        return {
+            "readings": self.readings,
+            "approached": self.approached,
+            "time": self.taken_at.isoformat(timespec="milliseconds").replace("+00:00", "Z"),
+            "settle": {"settled_s": self.settled, "exposure_s": self.frame.exposure},
+        }
+
+
+class Observer:
+    """Takes the views of one run with a rig that nobody else moves."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._approach = Approach(list(rig.specs))
+
+    async def go(self, targets: Mapping[str, float]) -> None:
+        """Move axes to `targets` (reading units) and confirm by a fresh state that they stand there.
+
+        Raises MotionError where they do not, and what `Rig.move` raises.
+        """
+        before = {axis.spec.name: axis.position for axis in self._rig.snapshot.axes}
+        await self._rig.move(targets)
+        self._approach.moved({name: at for name, at in before.items() if at is not None}, targets)
+        standing = await self._standing()
+        for name, target in targets.items():
+            spec, position = self._rig.specs[name], standing.axis(name).position
+            if position is None or abs(position - target) > spec.tolerance:
+                where = "an unknown position" if position is None else f"{position:g} {spec.unit}"
+                raise MotionError(
+                    f"axis '{name}' stands at {where} and was sent to {target:g} {spec.unit}: "
+                    "clear the way and home it"
+                )
+
+    async def look(self) -> Observation:
+        """Wait until the rig has settled, take a frame, and find the target in it.
+
+        Raises DetectionError where the target is not found, MotionError where an axis moves meanwhile, and
+        what `Rig.frame` raises.
+        """
+        clock = self._rig.clock
+        stood_at = (await self._standing()).timestamp
+        await clock.sleep(self._rig.profile.procedure.settle)
+        settled = await self._standing()
+        assert stood_at is not None
+        frame = await self._rig.frame(after=clock.now())
+        taken_at = datetime.now(UTC)
+        self._require_unmoved(settled, await self._standing())
+        detection = await asyncio.to_thread(detect, frame.image, self._rig.profile.target)
+        if len(detection.ids) == 0:
+            raise DetectionError("no point of the target was found in the picture")
+        return Observation(
+            frame=frame,
+            readings=[position for position in settled.readings if position is not None],
+            approached=self._approach.sides,
+            points=len(detection.ids),
+            taken_at=taken_at,
+            settled=frame.timestamp - stood_at,
+        )
+
+    async def _standing(self) -> RigSnapshot:
+        """Return a fresh snapshot in which every axis knows where it is, and stands; raises MotionError."""
+        snapshot = await self._rig.fresh_snapshot(self._rig.clock.now())
+        for axis in snapshot.axes:
+            if axis.moving:
+                raise MotionError(
+                    f"axis '{axis.spec.name}' moves when it should stand: find out who moves it"
+                )
+            if axis.position is None:
+                raise MotionError(f"axis '{axis.spec.name}' no longer knows where it is: home it")
+        return snapshot
+
+    def _require_unmoved(self, before: RigSnapshot, after: RigSnapshot) -> None:
+        for earlier, later in zip(before.axes, after.axes, strict=True):
+            assert earlier.position is not None
+            assert later.position is not None
+            spec = earlier.spec
+            if abs(later.position - earlier.position) > spec.tolerance:
+                raise MotionError(
+                    f"axis '{spec.name}' went from {earlier.position:g} to {later.position:g} {spec.unit} "
+                    "while a picture was taken: it does not hold its position"
+                )

@@ -1,0 +1,140 @@
+"""One calibration run, from its first move to its last word."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from uuid import uuid4
+
+from calib import Calibration
+from calib.documents import write_json
+from calib.errors import CalibError
+from calib.session_writer import SessionWriter
+from daemon.errors import DaemonError, RunStateError, StandstillError
+from daemon.procedure.conclusion import Conclusion, conclude
+from daemon.procedure.event_log import EventLog
+from daemon.procedure.events import Finished, StateChanged
+from daemon.procedure.gate import Gate
+from daemon.procedure.survey import Survey
+from daemon.rig import Rig
+from daemon.store import CalibrationRecord, RunRecord, RunState, Store
+from drivers.cancellation import finish
+from drivers.errors import DriverError
+
+logger = logging.getLogger(__name__)
+
+OnEnd = Callable[[CalibrationRecord | None, Calibration | None], None]
+
+
+class Run:
+    """A run under way: running -> (paused -> running)* -> succeeded, failed, cancelled or interrupted.
+
+    The end is stored before it is told, and comes only when the axes are confirmed to stand, or its error
+    says that they could not be. `on_end` is called between the two, with what a run that succeeded has found.
+    """
+
+    def __init__(self, record: RunRecord, rig: Rig, store: Store, on_end: OnEnd) -> None:
+        self.record = record
+        self.folder = store.session_folder(record)
+        self.log = EventLog(record.id, self.folder)
+        self._rig = rig
+        self._store = store
+        self._on_end = on_end
+        self._gate = Gate()
+        self._ending = RunState.CANCELLED, "it was cancelled"
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> asyncio.Task[None]:
+        """Begin; the task ends with the run and never fails."""
+        self._task = asyncio.create_task(self._execute(), name=f"run {self.record.id}")
+        return self._task
+
+    def pause(self) -> None:
+        """Let the run come to rest after the view in flight; raises RunStateError when it is to already."""
+        if self._gate.closed:
+            raise RunStateError(f"run '{self.record.id}' is paused, or will be after the view in flight")
+        self._gate.close()
+
+    def resume(self) -> None:
+        """Let the run go on; raises RunStateError when it is not paused."""
+        if not self._gate.closed:
+            raise RunStateError(f"run '{self.record.id}' is not paused")
+        self._gate.open()
+
+    async def end(self, state: RunState, why: str) -> None:
+        """Stop the run for good and return when its axes stand and its end is stored."""
+        if self._task is None or self._task.done():
+            return
+        self._ending = state, why
+        self._task.cancel()
+        await asyncio.wait([self._task])
+
+    async def _execute(self) -> None:
+        state, error, conclusion = RunState.SUCCEEDED, None, None
+        try:
+            conclusion = await self._work()
+        except asyncio.CancelledError:
+            state, error = self._ending
+        except (DaemonError, DriverError, CalibError) as failure:
+            state, error = RunState.FAILED, str(failure)
+        except OSError as failure:
+            state, error = RunState.FAILED, f"the session could not be written: {failure}"
+        except Exception as failure:
+            logger.exception("run '%s' failed", self.record.id)
+            state, error = RunState.FAILED, f"an error in the program, which its log describes: {failure!r}"
+        await finish(self._conclude(state, error, conclusion))
+
+    async def _work(self) -> Conclusion:
+        self.log.add(StateChanged(state=RunState.RUNNING))
+        empty = self._rig.profile.empty_session()
+        writer = await finish(asyncio.to_thread(SessionWriter, self.folder, empty))
+        await Survey(self._rig, writer, self.log, self._checkpoint).take()
+        return await conclude(self.folder, self.log)
+
+    async def _checkpoint(self) -> None:
+        if not self._gate.closed:
+            return
+        await self._change(RunState.PAUSED)
+        await self._gate.wait_open()
+        await self._change(RunState.RUNNING)
+
+    async def _change(self, state: RunState) -> None:
+        self.record = await self._store.change_run(self.record.id, state)
+        self.log.add(StateChanged(state=state))
+
+    async def _conclude(self, state: RunState, error: str | None, conclusion: Conclusion | None) -> None:
+        """Make sure that the axes stand, store the end, and tell it."""
+        if state is not RunState.SUCCEEDED:
+            try:
+                await self._rig.stop_axes(list(self._rig.specs))
+            except StandstillError as unconfirmed:
+                error = f"{error}; {unconfirmed}"
+        kept: CalibrationRecord | None = None
+        try:
+            kept = None if conclusion is None else await self._keep(conclusion)
+            self.record = await self._store.change_run(self.record.id, state, error, calibration=kept)
+        except (DaemonError, OSError) as failure:
+            logger.exception("the end of run '%s' could not be stored", self.record.id)
+            kept, error = None, f"its end could not be stored: {failure}"
+            self.record = replace(self.record, state=RunState.FAILED, error=error, ended_at=datetime.now(UTC))
+        if error is not None:
+            logger.warning("run '%s' %s: %s", self.record.id, self.record.state, error)
+        self._on_end(kept, None if conclusion is None else conclusion.calibration)
+        self.log.add(
+            Finished(state=self.record.state, error=error, calibration_id=self.record.calibration_id)
+        )
+
+    async def _keep(self, conclusion: Conclusion) -> CalibrationRecord:
+        """Write the calibration beside its session, and return the record that goes into the store."""
+        calibration = conclusion.calibration
+        await asyncio.to_thread(write_json, self.folder / "calibration.json", calibration)
+        return CalibrationRecord(
+            id=uuid4().hex,
+            created_at=datetime.now(UTC),
+            method=calibration.method,
+            active=True,
+            run_id=self.record.id,
+            document=calibration.model_dump_json(exclude_unset=True),
+            verification=conclusion.verification_json(),
+        )
