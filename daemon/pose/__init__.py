@@ -1,0 +1,13 @@
+"""Where the camera is.
+
+In the order in which an answer is made:
+
+    active       the calibration in use, prepared;  quaternion  rotations as quaternions
+    service      the pose now, and at given readings
+    pixels       world points to pixels, and back to rays
+"""
+
+from daemon.pose.active import ActiveCalibration
+from daemon.pose.service import PoseService
+
+__all__ = ["ActiveCalibration", "PoseService"]
