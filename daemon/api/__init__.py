@@ -1,0 +1,13 @@
+"""The REST API, as FastAPI routes over a running service.
+
+Its parts:
+
+    app             all routes together
+    problems        errors as problem documents;  dependencies  what routes are given
+    rig, lease, axes, camera, runs, calibrations, poses, pose_stream, metrics
+                    routes by what they are about;  *_documents  their larger answers
+"""
+
+from daemon.api.app import create_app
+
+__all__ = ["create_app"]

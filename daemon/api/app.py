@@ -1,0 +1,80 @@
+"""The app: every route under /api/v1, described for OpenAPI, with problems for errors."""
+
+from importlib.metadata import version
+from typing import Any, Final
+
+from fastapi import APIRouter, FastAPI
+from fastapi.routing import APIRoute
+
+from daemon.api import axes, calibrations, camera, lease, metrics, pose_stream, poses, problems, rig, runs
+from daemon.service import Service
+
+PREFIX: Final = "/api/v1"
+
+DESCRIPTION: Final = """
+Calibrates a camera on motorised axes with the camera itself, and says where the camera is.
+
+Metres, radians, seconds and pixels, except for what concerns an axis as such: readings, limits, moves and
+jogs are in that axis's own reading unit. Times are RFC 3339 in UTC. A transform `target_from_source` takes
+points of the source frame to the target frame. Errors are RFC 9457 problem documents; go by their `code`,
+which is stable.
+
+Whatever moves carries the token of the motion lease in the header `X-Lease`; `POST /stop` needs none.
+"""
+
+TAGS: Final = [
+    {"name": "pose", "description": "Where the camera is, and what it sees where."},
+    {"name": "runs", "description": "Calibration runs: one at a time, each under its own lease."},
+    {"name": "calibrations", "description": "What runs have found."},
+    {"name": "motion", "description": "Moving axes by hand, and stopping them."},
+    {"name": "lease", "description": "Who may move."},
+    {"name": "camera", "description": "The live picture."},
+    {"name": "rig", "description": "What there is, and how it is."},
+]
+
+
+def create_app(service: Service) -> FastAPI:
+    """Return the ASGI app of `service`, which its caller opens and closes."""
+    app = FastAPI(
+        title="activecam",
+        version=version("activecam"),
+        summary="Where is the camera?",
+        description=DESCRIPTION,
+        openapi_url=f"{PREFIX}/openapi.json",
+        openapi_tags=TAGS,
+        # The interactive pages load scripts from elsewhere, which a laboratory's network may not have.
+        docs_url=None,
+        redoc_url=None,
+        generate_unique_id_function=_operation_id,
+    )
+    app.state.service = service
+    api = APIRouter(prefix=PREFIX)
+    for part in (rig, lease, axes, camera, runs, calibrations, poses, pose_stream):
+        api.include_router(part.router)
+    app.include_router(api)
+    app.include_router(metrics.router)
+    problems.install(app)
+    _describe_problems(app)
+    return app
+
+
+def _operation_id(route: APIRoute) -> str:
+    return route.name
+
+
+def _describe_problems(app: FastAPI) -> None:
+    """Add the problem documents, which routes refer to by name, to the OpenAPI description."""
+    describe = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            schemas = describe()["components"]["schemas"]
+            for model in (problems.Problem, problems.InvalidField, problems.InvalidRequest):
+                reference = "#/components/schemas/{model}"
+                schema = model.model_json_schema(ref_template=reference)
+                schema.pop("$defs", None)
+                schemas[model.__name__] = schema
+        assert app.openapi_schema is not None
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]  # the way that FastAPI documents

@@ -1,0 +1,28 @@
+"""What routes are given: the service behind the app, and the lease that a request shows."""
+
+from typing import Annotated
+
+from fastapi import Depends, Header, Request
+
+from daemon.lease import Lease
+from daemon.service import Service
+
+
+def _service(request: Request) -> Service:
+    service: Service = request.app.state.service
+    return service
+
+
+ServiceDep = Annotated[Service, Depends(_service)]
+
+LeaseToken = Annotated[
+    str | None, Header(alias="X-Lease", description="The token of the motion lease, from POST /lease.")
+]
+
+
+def _lease(service: ServiceDep, token: LeaseToken = None) -> Lease:
+    return service.leases.require(token)
+
+
+LeaseDep = Annotated[Lease, Depends(_lease)]
+"""The lease that the request shows; without it the request is refused before its body is looked at."""

@@ -1,0 +1,188 @@
+"""Routes of the camera's pose, and of what it sees where."""
+
+import asyncio
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Request, Response
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, Field
+from pydantic_core import to_json
+
+from calib.errors import ReadingsError
+from daemon.api.dependencies import ServiceDep
+from daemon.api.pose_documents import Pixels, Pose, PosesAtReadings, Rays
+from daemon.api.problems import answers
+from daemon.errors import LensUnknownError, NotCalibratedError, StaleReadingError, UnknownCameraError
+from daemon.pose.pixels import project, rays
+from daemon.service import Service
+from drivers.errors import DeviceLostError, NotHomedError
+
+router = APIRouter(tags=["pose"])
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Readings = Annotated[
+    list[list[Number]],
+    Field(
+        min_length=1,
+        max_length=10_000,
+        description="Vectors of raw joint readings in chain order, each in its axis's own unit.",
+        examples=[[[12.5, 30.0]]],
+    ),
+]
+FewReadings = Annotated[
+    list[list[Number]],
+    Field(min_length=1, max_length=100, description="As for poses; the latest readings where left out."),
+]
+CameraName = Annotated[str | None, Field(description="The camera; the first where left out.")]
+
+SMALL = 64
+"""Vectors of readings that are computed at once; more go to a worker thread, so that others need not wait."""
+
+
+class PosesRequest(BaseModel):
+    """Where the camera would be."""
+
+    readings: Readings
+    camera: CameraName = None
+
+
+class ProjectRequest(BaseModel):
+    """World points (m) to be seen."""
+
+    points: Annotated[
+        list[Annotated[list[Number], Field(min_length=3, max_length=3)]],
+        Field(min_length=1, max_length=10_000, examples=[[[0.0, 0.0, 0.0]]]),
+    ]
+    readings: FewReadings | None = None
+    camera: CameraName = None
+
+
+class RaysRequest(BaseModel):
+    """Pixels to look through; (0, 0) is the centre of the top-left pixel."""
+
+    pixels: Annotated[
+        list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+        Field(min_length=1, max_length=10_000, examples=[[[319.5, 239.5]]]),
+    ]
+    readings: FewReadings | None = None
+    camera: CameraName = None
+
+
+@router.get(
+    "/pose",
+    summary="The camera's pose now",
+    response_model=Pose,
+    responses=answers(
+        NotCalibratedError, NotHomedError, UnknownCameraError, DeviceLostError, StaleReadingError
+    ),
+    openapi_extra={
+        "parameters": [
+            {
+                "name": "camera",
+                "in": "query",
+                "required": False,
+                "schema": {"type": "string"},
+                "description": "The camera; the first where left out.",
+            }
+        ]
+    },
+)
+async def get_pose(request: Request) -> Response:
+    """Answer from the latest readings and the active calibration, without touching hardware."""
+    # The hot path: nothing is resolved, validated or serialised that need not be.
+    service: Service = request.app.state.service
+    return _json(service.poses.now(request.query_params.get("camera")))
+
+
+@router.post(
+    "/pose",
+    summary="Poses at given readings",
+    response_model=PosesAtReadings,
+    responses=answers(NotCalibratedError, UnknownCameraError, ReadingsError),
+)
+async def get_poses(request: PosesRequest, service: ServiceDep) -> Response:
+    """Answer with one pose for each vector of readings; moves nothing."""
+    readings = _vectors(service, request.readings)
+    if len(readings) <= SMALL:
+        return _json(service.poses.at(readings, request.camera))
+    return _json(await asyncio.to_thread(service.poses.at, readings, request.camera))
+
+
+PIXEL_PROBLEMS = answers(
+    NotCalibratedError,
+    NotHomedError,
+    UnknownCameraError,
+    LensUnknownError,
+    ReadingsError,
+    DeviceLostError,
+    StaleReadingError,
+)
+
+
+@router.post("/project", summary="World points to pixels", response_model=Pixels, responses=PIXEL_PROBLEMS)
+async def project_points(request: ProjectRequest, service: ServiceDep) -> Response:
+    """Answer with the pixel at which each point is seen, for each vector of readings."""
+    active = service.poses.active
+    points, readings = np.array(request.points, dtype=float), _readings(service, request.readings)
+    pixels = await asyncio.to_thread(project, active, points, readings, request.camera)
+    return _json(
+        to_json(
+            {
+                "calibration_id": active.id,
+                "camera": active.camera(request.camera),
+                "readings": readings.tolist(),
+                "pixels": [_rows(row) for row in pixels],
+            }
+        )
+    )
+
+
+@router.post("/rays", summary="Pixels to rays in the world", response_model=Rays, responses=PIXEL_PROBLEMS)
+async def pixel_rays(request: RaysRequest, service: ServiceDep) -> Response:
+    """Answer with the ray along which each pixel looks, for each vector of readings."""
+    active = service.poses.active
+    pixels, readings = np.array(request.pixels, dtype=float), _readings(service, request.readings)
+    found = await asyncio.to_thread(rays, active, pixels, readings, request.camera)
+    bundles = [
+        {"origin": origin.tolist(), "directions": _rows(directions)}
+        for origin, directions in zip(found.origins, found.directions, strict=True)
+    ]
+    return _json(
+        to_json(
+            {
+                "calibration_id": active.id,
+                "camera": active.camera(request.camera),
+                "readings": readings.tolist(),
+                "rays": bundles,
+            }
+        )
+    )
+
+
+def _readings(service: Service, given: list[list[float]] | None) -> NDArray[np.float64]:
+    return service.poses.readings_now()[None] if given is None else _vectors(service, given)
+
+
+def _vectors(service: Service, given: list[list[float]]) -> NDArray[np.float64]:
+    """Return readings (n, m); raises ReadingsError naming the first vector of the wrong length."""
+    axes = list(service.rig.specs)
+    for index, vector in enumerate(given):
+        if len(vector) != len(axes):
+            raise ReadingsError(
+                f"readings[{index}] has {len(vector)} numbers: give one for each axis, {', '.join(axes)}"
+            )
+    return np.array(given, dtype=float)
+
+
+def _rows(values: ArrayLike) -> list[Any]:
+    """Return rows as lists, with None for those that are not all finite."""
+    rows = np.asarray(values, dtype=float)
+    return [
+        row if good else None
+        for row, good in zip(rows.tolist(), np.isfinite(rows).all(axis=-1).tolist(), strict=True)
+    ]
+
+
+def _json(content: bytes) -> Response:
+    return Response(content, media_type="application/json")

@@ -1,0 +1,101 @@
+"""The daemon without its HTTP: rig, lease, store, runs and poses, opened together and closed in order."""
+
+import contextlib
+import logging
+from collections.abc import AsyncIterator
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from calib import Calibration
+from calib.documents import first_problem
+from calib.errors import CalibError, FormatError
+from daemon.client_motion import ClientMotions
+from daemon.errors import DaemonError
+from daemon.lease import LeaseDesk
+from daemon.live_picture import LivePicture
+from daemon.pose import PoseService
+from daemon.procedure import RunManager
+from daemon.profile import Profile
+from daemon.rig import Rig
+from daemon.store import CalibrationRecord, Store
+from daemon.streams import Streams
+
+logger = logging.getLogger(__name__)
+
+
+class Service:
+    """One rig in operation. See `running_service`."""
+
+    def __init__(self, profile: Profile, rig: Rig, store: Store) -> None:
+        self.profile = profile
+        self.rig = rig
+        self.store = store
+        self.leases = LeaseDesk()
+        self.motions = ClientMotions(rig, self.leases)
+        self.poses = PoseService(rig)
+        self.runs = RunManager(rig, self.leases, store, self._use)
+        self.pictures = LivePicture(rig)
+        self.streams = Streams()
+        self.started_at = datetime.now(UTC)
+        self.version = version("activecam")
+
+    async def activate(self, calibration_id: str) -> CalibrationRecord:
+        """Compute poses from this calibration from now on, and after every restart.
+
+        Raises UnknownCalibrationError, CalibrationMismatchError, FormatError and StoreError; the one that was
+        active stays so then.
+        """
+        record = await self.store.calibration(calibration_id)
+        self.poses.activate(record.id, _document(record))
+        return await self.store.activate(calibration_id)
+
+    async def restore(self) -> None:
+        """Take up what an earlier daemon left: the active calibration, and runs that it did not finish."""
+        for run in await self.store.interrupt_unfinished():
+            logger.warning("run '%s' was interrupted: %s", run.id, run.error)
+        record = await self.store.active_calibration()
+        if record is None:
+            return
+        try:
+            self.poses.activate(record.id, _document(record))
+        except (CalibError, DaemonError) as error:
+            # A rig without a pose can still be calibrated; GET /pose says that nothing is.
+            logger.warning("the active calibration cannot be used: %s", error)
+
+    async def halt(self) -> None:
+        """End streams, motions and the run, and return when the axes stand."""
+        self.streams.close()
+        self.rig.latch.engage("the daemon is shutting down")
+        await self.motions.close()
+        await self.runs.close()
+        self.leases.close()
+
+    def _use(self, record: CalibrationRecord, calibration: Calibration) -> None:
+        self.poses.activate(record.id, calibration)
+
+
+@contextlib.asynccontextmanager
+async def running_service(profile: Profile, data: Path) -> AsyncIterator[Service]:
+    """Open the rig of `profile` and what is stored in `data`; on leaving, the axes are stopped and let go.
+
+    Raises StoreError and OptionsError. A device that is not there is no error: it is looked for until it is.
+    """
+    async with contextlib.AsyncExitStack() as stack:
+        store = await Store.open(data)
+        stack.push_async_callback(store.close)
+        rig = await Rig.open(profile)
+        stack.push_async_callback(rig.close)
+        service = Service(profile, rig, store)
+        stack.push_async_callback(service.halt)
+        await service.restore()
+        yield service
+
+
+def _document(record: CalibrationRecord) -> Calibration:
+    try:
+        return Calibration.model_validate_json(record.document)
+    except ValidationError as error:
+        raise FormatError(f"calibration '{record.id}': {first_problem(error)}") from error
