@@ -1,0 +1,142 @@
+"""Serving a rig: the socket first, then the devices, and at the end the axes before the connections."""
+
+import asyncio
+import contextlib
+import ipaddress
+import logging
+import signal
+import socket
+from collections.abc import Callable, Generator
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+import uvicorn
+
+from daemon.errors import ServeError
+from daemon.profile import Profile
+from daemon.service import Service, running_service
+
+logger = logging.getLogger(__name__)
+
+DEFAULT_HOST: Final = "127.0.0.1"
+DEFAULT_PORT: Final = 8080
+GRACE: Final = 5
+"""Seconds that an answer under way may still take at a shutdown."""
+
+
+class Server(uvicorn.Server):
+    """uvicorn, which ends long answers before it waits for them, and leaves the signals to `serve`."""
+
+    def __init__(self, config: uvicorn.Config, service: Service) -> None:
+        super().__init__(config)
+        self._service = service
+        self.exit_asked = asyncio.Event()
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Begin to shut down; uvicorn waits for every connection, and a stream would never end."""
+        self._service.streams.close()
+        self.exit_asked.set()
+        super().handle_exit(sig, frame)
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Generator[None]:
+        """Capture none: uvicorn raises what it captured again when it ends, before the axes are let go."""
+        yield
+
+
+def serve(
+    profile: Profile,
+    data: Path,
+    host: str = DEFAULT_HOST,
+    port: int = DEFAULT_PORT,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve the rig of `profile` until SIGINT or SIGTERM, with what is stored in `data`.
+
+    `on_ready` is called with the address (http://host:port) when requests are taken; port 0 takes a free one.
+    Raises ServeError, before anything is opened, when it cannot listen there; StoreError and OptionsError.
+    """
+    listening = bind(host, port)
+    if not ipaddress.ip_address(listening.getsockname()[0]).is_loopback:
+        logger.warning("whoever reaches %s can move the axes: nobody is asked who they are", host)
+    try:
+        asyncio.run(_serve(profile, data, listening, on_ready))
+    finally:
+        listening.close()
+
+
+def bind(host: str, port: int) -> socket.socket:
+    """Return a socket bound to `host` and `port`; raises ServeError with what to do."""
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        listening = socket.socket(family, socket.SOCK_STREAM)
+    except OSError as error:
+        raise ServeError(f"cannot listen on {host}: {error.strerror}: choose another --host") from None
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind((host, port))
+        # Listening already keeps a second daemon out while this one is still opening its devices.
+        listening.listen(2048)
+    except (OSError, OverflowError) as error:
+        listening.close()
+        reason = error.strerror if isinstance(error, OSError) else "a port is between 0 and 65535"
+        raise ServeError(
+            f"cannot listen on {host}, port {port}: {reason}: stop what uses it, or choose another --port"
+        ) from None
+    return listening
+
+
+async def _serve(
+    profile: Profile, data: Path, listening: socket.socket, on_ready: Callable[[str], None] | None
+) -> None:
+    main = asyncio.current_task()
+    assert main is not None
+    loop = asyncio.get_running_loop()
+    # Until the server takes them over, a signal ends the opening of the devices in an orderly way.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, main.cancel)
+    try:
+        async with running_service(profile, data) as service:
+            await _serve_service(service, listening, on_ready)
+    except asyncio.CancelledError:
+        logger.info("ended before it was ready")
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.remove_signal_handler(number)
+
+
+async def _serve_service(
+    service: Service, listening: socket.socket, on_ready: Callable[[str], None] | None
+) -> None:
+    from daemon.api import create_app  # FastAPI takes its time to import, and a port in use needs none
+
+    config = uvicorn.Config(
+        create_app(service),
+        lifespan="off",
+        log_config=None,
+        access_log=False,
+        timeout_graceful_shutdown=GRACE,
+    )
+    server = Server(config, service)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, server.handle_exit, number, None)
+    serving = asyncio.create_task(server.serve(sockets=[listening]))
+    exit_asked = asyncio.create_task(server.exit_asked.wait())
+    try:
+        if on_ready is not None:
+            on_ready(address_of(listening))
+        await asyncio.wait({serving, exit_asked}, return_when=asyncio.FIRST_COMPLETED)
+        # The axes come first: they must not go on moving while connections are drained.
+        await service.halt()
+    finally:
+        exit_asked.cancel()
+        server.handle_exit(signal.SIGTERM, None)
+        await serving
+
+
+def address_of(listening: socket.socket) -> str:
+    """Return the address at which a bound socket is reached."""
+    host, port = listening.getsockname()[:2]
+    return f"http://[{host}]:{port}" if listening.family == socket.AF_INET6 else f"http://{host}:{port}"
