@@ -6,7 +6,7 @@ from typing import Any
 
 from drivers.axis import AxisSpec
 from drivers.camera import CameraSpec
-from drivers.clock import Clock, ScaledClock
+from drivers.clock import Clock
 from drivers.simulated.camera import SimulatedCamera, SimulatedCameraOptions
 from drivers.simulated.controller import (
     SimulatedAxisOptions,
@@ -15,6 +15,7 @@ from drivers.simulated.controller import (
 )
 from drivers.simulated.options import SimulationOptions
 from drivers.simulated.world import SimulatedWorld
+from tests.drivers.clocks import VirtualClock
 
 TARGETS: dict[str, dict[str, Any]] = {
     "circle_grid": {"kind": "circle_grid", "rows": 6, "columns": 7, "pitch": 0.03, "disk_diameter": 0.018},
@@ -69,7 +70,7 @@ def still_world(
 ) -> SimulatedWorld:
     """A camera on a stand: no axes."""
     options = SimulationOptions.model_validate({"camera": camera_truth(**camera), "plate": plate or {}})
-    return SimulatedWorld(options, [], TARGETS[kind], ScaledClock(1))
+    return SimulatedWorld(options, [], TARGETS[kind], VirtualClock())
 
 
 def world(

@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 
 from drivers.camera import CameraSpec
-from drivers.clock import ScaledClock
 from drivers.driver import DriverContext
 from drivers.errors import DeviceLostError, DeviceTimeoutError, OptionsError
 from drivers.simulated.camera import SimulatedCamera
 from drivers.simulated.motion import trapezoid
 from drivers.simulated.world import SimulatedWorld
 from tests.drivers import rigs
+from tests.drivers.clocks import VirtualClock
 
 SMALL = {"lens": {"fx": "700 px", "fy": "700 px", "cx": "320 px", "cy": "240 px"}}
 
 
-def world(scale: float = 20, **changes: Any) -> SimulatedWorld:
-    return rigs.world(ScaledClock(scale), **SMALL | changes)
+def world(**changes: Any) -> SimulatedWorld:
+    return rigs.world(VirtualClock(), **SMALL | changes)
 
 
 async def opened(world: SimulatedWorld, **options: Any) -> SimulatedCamera:
@@ -37,7 +37,7 @@ async def test_frames_begin_on_the_grid_of_the_frame_rate() -> None:
 
 
 async def test_the_first_frame_that_begins_after_is_taken() -> None:
-    rig = world(scale=5, picture={"frame_rate": "2 Hz", "exposure": "10 ms"})
+    rig = world(picture={"frame_rate": "2 Hz", "exposure": "10 ms"})
     camera = await opened(rig)
     after = rig.clock.now() + 0.2
     frame = await camera.frame(after=after)
@@ -45,7 +45,7 @@ async def test_the_first_frame_that_begins_after_is_taken() -> None:
 
 
 async def test_a_frame_is_taken_once_and_shared() -> None:
-    camera = await opened(rig := world(scale=5, picture={"frame_rate": "1 Hz"}))
+    camera = await opened(rig := world(picture={"frame_rate": "1 Hz"}))
     after = rig.clock.now()
     first, second = await asyncio.gather(camera.frame(after), camera.frame(after))
     assert first is second
@@ -138,7 +138,7 @@ async def test_a_lost_camera_can_be_plugged_in_again() -> None:
 
 
 async def test_a_frozen_camera_times_out_rather_than_repeat_an_old_frame() -> None:
-    rig = world(scale=100)
+    rig = world()
     camera = await opened(rig, timeout="500 ms")
     first = await camera.frame()
     camera.inject("frozen")
@@ -165,7 +165,7 @@ async def test_a_late_camera_stamps_its_frames_truly() -> None:
 async def test_a_device_that_fails_from_the_start() -> None:
     with pytest.raises(DeviceLostError):
         await opened(world(), fault="lost")
-    frozen = await opened(world(scale=100), fault="frozen")
+    frozen = await opened(world(), fault="frozen")
     with pytest.raises(DeviceTimeoutError):
         await frozen.frame(after=30.0)
 
@@ -173,7 +173,7 @@ async def test_a_device_that_fails_from_the_start() -> None:
 async def test_options_that_do_not_fit_are_refused_with_the_reason() -> None:
     with pytest.raises(OptionsError, match=r"needs a world: add a \[simulation\] table"):
         SimulatedCamera.create(
-            CameraSpec("main", 640, 480), SimulatedCamera.Options(), DriverContext(ScaledClock(1))
+            CameraSpec("main", 640, 480), SimulatedCamera.Options(), DriverContext(VirtualClock())
         )
     with pytest.raises(OptionsError, match=r"cannot see all of a 640 x 480 picture"):
         await opened(world(lens=SMALL["lens"] | {"fx": "200 px", "fy": "200 px", "distortion": [-0.3]}))

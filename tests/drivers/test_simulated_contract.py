@@ -1,22 +1,22 @@
 """The simulated devices pass the contract that every driver passes."""
 
-from drivers.clock import ScaledClock
 from drivers.contract import AxisBench, AxisContract, CameraBench, CameraContract
 from tests.drivers import rigs
+from tests.drivers.clocks import VirtualClock
 
 SMALL_LENS = {"fx": "350 px", "fy": "350 px", "cx": "160 px", "cy": "120 px"}
 
 
 class TestSimulatedSlide(AxisContract):
     def bench(self) -> AxisBench:
-        clock = ScaledClock(100)
+        clock = VirtualClock()
         controller = rigs.controller(rigs.world(clock))
         return AxisBench(controller, "slide", clock, unplug=lambda: controller.inject("lost"))
 
 
 class TestSimulatedPanWithImperfections(AxisContract):
     def bench(self) -> AxisBench:
-        clock = ScaledClock(100)
+        clock = VirtualClock()
         pan = {
             "backlash": "0.2 deg",
             "encoder_resolution": "0.002 deg",
@@ -29,6 +29,6 @@ class TestSimulatedPanWithImperfections(AxisContract):
 
 class TestSimulatedCamera(CameraContract):
     def bench(self) -> CameraBench:
-        clock = ScaledClock(20)
+        clock = VirtualClock()
         camera = rigs.camera(rigs.world(clock, lens=SMALL_LENS), width=320, height=240)
         return CameraBench(camera, clock, unplug=lambda: camera.inject("lost"))

@@ -7,7 +7,6 @@ import pytest
 
 from drivers.axis import AxisSpec
 from drivers.cancellation import finish
-from drivers.clock import ScaledClock
 from drivers.driver import DriverContext
 from drivers.errors import (
     DeviceFaultError,
@@ -22,13 +21,14 @@ from drivers.errors import (
 from drivers.simulated.axis import SimulatedAxis
 from drivers.simulated.controller import SimulatedAxisOptions, SimulatedController
 from tests.drivers import rigs
+from tests.drivers.clocks import VirtualClock
 
 
-def rig(clock: ScaledClock | None = None, **options: Any) -> SimulatedController:
-    return rigs.controller(rigs.world(clock or ScaledClock(200)), **options)
+def rig(clock: VirtualClock | None = None, **options: Any) -> SimulatedController:
+    return rigs.controller(rigs.world(clock or VirtualClock()), **options)
 
 
-async def homed(clock: ScaledClock | None = None, **options: Any) -> SimulatedController:
+async def homed(clock: VirtualClock | None = None, **options: Any) -> SimulatedController:
     controller = rig(clock, **options)
     await controller.open()
     for axis in controller.axes.values():
@@ -37,16 +37,16 @@ async def homed(clock: ScaledClock | None = None, **options: Any) -> SimulatedCo
 
 
 def make(
-    axis_options: dict[str, Any], spec: AxisSpec = rigs.SLIDE, clock: ScaledClock | None = None
+    axis_options: dict[str, Any], spec: AxisSpec = rigs.SLIDE, clock: VirtualClock | None = None
 ) -> SimulatedController:
-    world = rigs.world(clock or ScaledClock(200))
+    world = rigs.world(clock or VirtualClock())
     options = {spec.name: SimulatedAxisOptions.model_validate(axis_options)}
     return SimulatedController.create(
         {spec.name: spec}, SimulatedController.Options(), options, DriverContext(world.clock, world)
     )
 
 
-async def under_way(axis: SimulatedAxis, clock: ScaledClock) -> None:
+async def under_way(axis: SimulatedAxis, clock: VirtualClock) -> None:
     """Wait until the axis moves."""
     while not (await axis.read()).moving:
         await clock.sleep(0.02)
@@ -63,7 +63,7 @@ async def test_homing_lands_at_the_home_position() -> None:
 
 
 async def test_the_motion_takes_the_time_that_physics_asks_for() -> None:
-    controller = await homed(clock := ScaledClock(200))
+    controller = await homed(clock := VirtualClock())
     axis = controller.axes["slide"]
     began = clock.now()
     await axis.move(50.0)
@@ -72,7 +72,7 @@ async def test_the_motion_takes_the_time_that_physics_asks_for() -> None:
 
 
 async def test_axes_move_at_the_same_time() -> None:
-    controller = await homed(clock := ScaledClock(200))
+    controller = await homed(clock := VirtualClock())
     slide, pan = controller.axes["slide"], controller.axes["pan"]
     moves = asyncio.gather(slide.move(80.0), pan.move(15.0))
     await under_way(slide, clock)
@@ -84,7 +84,7 @@ async def test_axes_move_at_the_same_time() -> None:
 
 async def test_the_encoder_counts_and_scatters() -> None:
     world = rigs.world(
-        ScaledClock(200), slide={"encoder_resolution": "0.5 mm"}, pan={"reading_noise": "0.01 deg"}
+        VirtualClock(), slide={"encoder_resolution": "0.5 mm"}, pan={"reading_noise": "0.01 deg"}
     )
     controller = rigs.controller(world)
     await controller.open()
@@ -118,7 +118,7 @@ async def test_a_motion_that_never_ends_times_out_and_is_stopped() -> None:
 
 
 async def test_a_mute_device_is_lost_after_its_time_out_and_comes_back() -> None:
-    controller = await homed(clock := ScaledClock(200), answer_timeout="500 ms")
+    controller = await homed(clock := VirtualClock(), answer_timeout="500 ms")
     controller.inject("mute")
     began = clock.now()
     with pytest.raises(DeviceLostError, match=r"has not answered for 0.5 s"):
@@ -130,7 +130,7 @@ async def test_a_mute_device_is_lost_after_its_time_out_and_comes_back() -> None
 
 
 async def test_an_unplugged_device_has_forgotten_where_it_is() -> None:
-    controller = await homed(clock := ScaledClock(200))
+    controller = await homed(clock := VirtualClock())
     axis = controller.axes["slide"]
     move = asyncio.create_task(axis.move(80.0))
     await under_way(axis, clock)
@@ -153,7 +153,7 @@ async def test_an_unplugged_device_has_forgotten_where_it_is() -> None:
 
 
 async def test_an_alarm_stops_the_axes_until_they_are_homed() -> None:
-    controller = await homed(clock := ScaledClock(200))
+    controller = await homed(clock := VirtualClock())
     slide, pan = controller.axes["slide"], controller.axes["pan"]
     move = asyncio.create_task(slide.move(80.0))
     await under_way(slide, clock)
@@ -192,7 +192,7 @@ async def test_a_planned_fault_happens_in_its_motion(fault: str, error: type[Exc
 
 
 async def test_a_homing_that_is_stopped_leaves_the_axis_unhomed() -> None:
-    clock = ScaledClock(200)
+    clock = VirtualClock()
     controller = make({"power_up_position": "-90 mm", "home_position": "90 mm"}, clock=clock)
     await controller.open()
     axis = controller.axes["slide"]
@@ -206,7 +206,7 @@ async def test_a_homing_that_is_stopped_leaves_the_axis_unhomed() -> None:
 
 
 async def test_a_cancelled_move_brakes_and_does_not_jump_to_a_stop() -> None:
-    world = rigs.world(ScaledClock(50))
+    world = rigs.world(VirtualClock())
     controller = rigs.controller(world)
     await controller.open()
     axis, (_, shaft) = controller.axes["slide"], world.shaft("slide")
@@ -243,7 +243,7 @@ def test_options_that_do_not_fit_are_refused_with_the_reason() -> None:
     with pytest.raises(OptionsError, match=r"the simulated world has no axis 'tilt'"):
         make({}, AxisSpec("tilt", "revolute", "deg", (0, 1), 1, 1, 1))
     with pytest.raises(OptionsError, match=r"needs a world: add a \[simulation\] table"):
-        SimulatedController.create({}, SimulatedController.Options(), {}, DriverContext(ScaledClock(1)))
+        SimulatedController.create({}, SimulatedController.Options(), {}, DriverContext(VirtualClock()))
     with pytest.raises(ValueError, match=r"'stall' is a fault of one axis"):
         rig().inject("stall")
 

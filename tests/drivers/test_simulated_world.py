@@ -10,14 +10,14 @@ from pydantic import ValidationError
 from scipy.linalg import expm
 
 from drivers.axis import AxisSpec
-from drivers.clock import ScaledClock
 from drivers.errors import OptionsError
 from drivers.simulated.motion import trapezoid
 from drivers.simulated.options import SimulationOptions
 from drivers.simulated.world import SimulatedWorld
 from tests.drivers import rigs
+from tests.drivers.clocks import VirtualClock
 
-CLOCK = ScaledClock(1)
+CLOCK = VirtualClock()
 
 
 def make(joints: list[Any], axes: list[AxisSpec], **camera: Any) -> SimulatedWorld:
