@@ -1,6 +1,8 @@
-"""ChArUco boards: chessboard corners that the markers round them number."""
+"""ChArUco boards: corners of a chessboard, numbered by the markers round them."""
 
 from __future__ import annotations
+
+from math import sqrt
 
 import cv2
 import numpy as np
@@ -8,11 +10,33 @@ import numpy as np
 from calib.detection.corners import corner_covariances, refine_corners
 from calib.detection.detection import Detection
 from calib.detection.picture import Picture
+from calib.detection.plane import view_of_plane
 from calib.errors import DetectionError
 from calib.targets import Charuco, target_points
 
-FEWEST_CORNERS = 4
-
 
 def detect_charuco(picture: Picture, target: Charuco) -> Detection:
-    """Find the inner corners that can be seen, as long as at least 4 of them do not lie on one line."""
+    """Find the inner corners in view; raises DetectionError where they are fewer than 4 or on one line."""
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, target.dictionary))
+    board = cv2.aruco.CharucoBoard((target.columns, target.rows), target.pitch, target.marker, dictionary)
+    corners, numbers, _, markers = cv2.aruco.CharucoDetector(board).detectBoard(picture.grey)
+    # OpenCV says None where there is nothing, whatever the annotation says.
+    ids = np.array([] if numbers is None else numbers, dtype=np.int64).ravel()
+    rough = np.array([] if corners is None else corners, dtype=np.float64).reshape(-1, 2)
+    plane = target_points(target)[ids, :2]
+    view = view_of_plane(plane, rough)
+    if view is None:
+        seen = 0 if markers is None else len(markers)
+        raise DetectionError(
+            f"the ChArUco board of {target.rows} x {target.columns} squares was not found: {len(ids)} "
+            f"corners and {seen} markers of {target.dictionary} were seen in the picture of "
+            f"{picture.size}, and 4 corners not on one line are needed; is it in view and sharp?"
+        )
+    # A marker's own corner is the nearest thing to a corner of the board, across a white square's diagonal.
+    clear = (target.pitch - target.marker) / 2 * sqrt(2)
+    reaches = clear * view.scales(plane)
+    # OpenCV 4's corners are half a pixel off, which measuring them anew mends.
+    pixels = refine_corners(picture, rough, reaches)
+    order = np.argsort(ids)
+    covariances = corner_covariances(picture, pixels, reaches)
+    return Detection(ids[order], pixels[order], covariances[order], disk=None)

@@ -21,8 +21,8 @@ from calib.targets import AprilGrid, AsymmetricCircleGrid, Charuco, Chessboard, 
 def detect(image: NDArray[np.generic], target: Target) -> Detection:
     """Find the target's points in a picture: grey, BGR or BGRA, of 8 or 16 bits.
 
-    The ids are the target's own. A target that looks the same after a turn is read so that its point 0 is the one nearest
-    to the picture's top left corner; a mirrored reading is never given.
+    The ids are the target's own. A target that looks the same after a turn is read so that its point 0 is the
+    one nearest to the picture's top left corner; a mirrored reading is never given.
 
     Raises DetectionError, in one sentence, where the target is not seen or the array is no picture.
     """

@@ -11,8 +11,8 @@ from calib.targets import Target, target_symmetries
 def is_mirrored(grid: NDArray[np.float64]) -> bool:
     """Tell whether a grid of pixels (rows, columns, 2) would put Z = X x Y towards the camera.
 
-    The printed side faces the camera and pixel y points down, so that the outline from the first point along the
-    columns and then along the rows has a positive area.
+    The printed side faces the camera and pixel y points down, so that the outline from the first point along
+    the columns and then along the rows has a positive area.
     """
     outline = grid[[0, 0, -1, -1], [0, -1, -1, 0]]
     following = np.roll(outline, -1, axis=0)
@@ -22,8 +22,8 @@ def is_mirrored(grid: NDArray[np.float64]) -> bool:
 def upright(target: Target, pixels: NDArray[np.float64]) -> NDArray[np.int64]:
     """Choose the reading whose point 0 is nearest to the picture's top left corner, pixel (0, 0).
 
-    `pixels` (n, 2) are one reading of the whole target, by id; the result (n,) is a permutation: the chosen reading is
-    `pixels[permutation]`. A target without symmetries is left as it is.
+    `pixels` (n, 2) are one reading of the whole target, by id; the result (n,) is a permutation: the chosen
+    reading is `pixels[permutation]`. A target without symmetries is left as it is.
     """
     readings = [np.arange(len(pixels)), *(symmetry.permutation for symmetry in target_symmetries(target))]
     return min(readings, key=lambda reading: float(np.hypot(*pixels[reading[0]])))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from math import sqrt
 
 import cv2
 import numpy as np
@@ -17,8 +19,8 @@ SMALLEST_SIDE = 32
 class Picture:
     """One picture in two forms: `grey` to search in and `values` to measure in, both (height, width).
 
-    `grey` has 8 bits, stretched so that the picture fills them, whatever its exposure and depth; `values` are the
-    camera's own grey values. `noise` is the standard deviation of `values`.
+    `grey` has 8 bits, stretched so that the picture fills them, whatever its exposure and depth; `values` are
+    the camera's own grey values. `noise` is the standard deviation of `values`.
     """
 
     grey: NDArray[np.uint8]
@@ -53,17 +55,31 @@ def read_picture(image: NDArray[np.generic]) -> Picture:
         raise DetectionError(
             f"a picture of {width} x {height} px is too small to hold a target: check the camera's format"
         )
-    values = _as_grey(image)
+    depth = np.uint8 if image.dtype.itemsize == 1 else np.uint16
+    values = _as_grey(np.ascontiguousarray(image, dtype=depth))
     return Picture(_stretched(values), values.astype(np.float32), _noise(values))
 
 
-def _as_grey(image: NDArray[np.generic]) -> NDArray[np.uint8 | np.uint16]:
-    native = np.ascontiguousarray(image, dtype=np.uint8 if image.dtype.itemsize == 1 else np.uint16)
-    channels = 1 if native.ndim == 2 else native.shape[2]
-    if channels == 1:
-        return native.reshape(native.shape[:2])
-    code = cv2.COLOR_BGR2GRAY if channels == 3 else cv2.COLOR_BGRA2GRAY
-    return np.asarray(cv2.cvtColor(native, code))
+def copies(grey: NDArray[np.uint8], side: int) -> Iterator[tuple[NDArray[np.uint8], float]]:
+    """Give a copy that is quick to search, `side` px long, and then the picture; each with its scale."""
+    scale = side / max(grey.shape)
+    if scale < 1:
+        yield np.asarray(cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)), scale
+    yield grey, 1.0
+
+
+def in_original(pixels: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+    """Take pixels (..., 2) of a copy to the original: they share their outline, half a pixel off pixel 0."""
+    return (pixels + 0.5) / scale - 0.5
+
+
+def _as_grey(image: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8 | np.uint16]:
+    if image.ndim == 2:
+        return image
+    if image.shape[2] == 1:
+        return image[:, :, 0]
+    code = cv2.COLOR_BGR2GRAY if image.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
+    return np.asarray(cv2.cvtColor(image, code), dtype=image.dtype)
 
 
 def _stretched(values: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
@@ -72,18 +88,20 @@ def _stretched(values: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
     if dark == bright:
         dark, bright = values.min(), values.max()
     if dark == bright:
-        raise DetectionError(f"every pixel has the grey value {dark:g}: is the lens covered or the light off?")
+        raise DetectionError(
+            f"every pixel has the grey value {dark:g}: is the lens covered or the light off?"
+        )
     levels = np.arange(np.iinfo(values.dtype).max + 1)
     table = np.clip(np.rint((levels - dark) * (255.0 / (bright - dark))), 0, 255).astype(np.uint8)
-    return table[values]
+    return np.asarray(table[values])
 
 
 def _noise(values: NDArray[np.uint8 | np.uint16]) -> float:
-    """Standard deviation of the grey values' noise, at least that of rounding to whole numbers.
+    """Estimate the standard deviation of the grey values' noise, at least that of rounding to whole numbers.
 
     From the median response to a mask that is blind to planes and edges (Immerkær, Fast noise variance
     estimation, 1996), whose deviation is 6 times the noise's.
     """
     mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
     response = np.asarray(cv2.filter2D(values, cv2.CV_32F, mask))[1:-1:3, 1:-1:3]
-    return max(float(np.median(np.abs(response))) / 0.6745 / 6, 1 / np.sqrt(12))
+    return max(float(np.median(np.abs(response))) / 0.6745 / 6, sqrt(1 / 12))
