@@ -95,7 +95,7 @@ def test_no_scale_is_the_nominal_one(profile: Profile) -> None:
     for axis, joint in zip(profile.axes, profile.simulation.joints, strict=True):
         nominal = {"mm": 1e-3, "deg": np.pi / 180}.get(axis.spec.unit)
         if nominal is not None:
-            assert 5e-5 < abs(joint.scale / nominal - 1) < 5e-3
+            assert 2e-5 < abs(joint.scale / nominal - 1) < 5e-3
 
 
 def test_the_papers_table_is_the_papers() -> None:
