@@ -68,10 +68,11 @@ class AsymmetricCircleGrid(_ScaledPrint):
 
     `pitch` is the spacing along a row's own disks; rows are half a pitch apart. The disk in row r and column
     c has its centre at x = (2 c + r mod 2) pitch / 2, y = r pitch / 2, and id = row * columns + column.
+    OpenCV finds no such grid of fewer than 4 rows.
     """
 
     kind: Literal["asymmetric_circle_grid"] = "asymmetric_circle_grid"
-    rows: int = Field(ge=2, le=MOST_ROWS)
+    rows: int = Field(ge=4, le=MOST_ROWS)
     columns: int = Field(ge=2, le=MOST_ROWS)
     pitch: Length
     disk_diameter: Length

@@ -1,11 +1,13 @@
 """Finding a printed target's points in a picture.
 
 picture      what a camera gave, as grey values to search and to measure in
-circle_grid  symmetric and asymmetric grids of disks;  disks  their centroids on the grey values
-chessboard   inner corners of a chessboard
-charuco      chessboard corners that markers number
-aprilgrid    corners of tags
-corners      corners on the grey values;  labelling  which of a grid's readings is the target's
+circle_grid  symmetric and asymmetric grids of disks;  disks: their centroids on the grey values
+chessboard   its inner corners
+charuco      chessboard corners, numbered by markers;  corners: both kinds' corners on the grey values
+aprilgrid    corners of tags;  tag_edges: the lines that cross in them
+plane        how a flat target lies in the picture
+labelling    which of a grid's readings is the target's
+detector     one call for all kinds
 """
 
 from calib.detection.detection import Detection

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from calib.detection.picture import Picture
 
-REPEATS = 6
+MOST_REPEATS = 6
+STANDS_STILL = 0.01  # px
 SAMPLES_PER_PIXEL = 4
 FEWEST_PROFILES, MOST_PROFILES = 8, 64
 NEARLY_PARALLEL = 1e-3
@@ -45,7 +46,7 @@ def refine_tag(picture: Picture, corners: NDArray[np.float64], reach: float) -> 
     `reach` is how far (px) to both sides of an edge there is only black and only white.
     """
     start = corners
-    for _ in range(REPEATS):
+    for _ in range(MOST_REPEATS):
         following = np.roll(corners, -1, axis=0)
         lines = [_edge(picture, a, b, reach) for a, b in zip(corners, following, strict=True)]
         found = [line for line in lines if line is not None]
@@ -53,9 +54,11 @@ def refine_tag(picture: Picture, corners: NDArray[np.float64], reach: float) -> 
             return None
         # Each corner starts its own edge and ends the one before.
         crossings = [_crossing(found[side - 1], found[side]) for side in range(4)]
-        corners = np.array([pixel for pixel, _ in crossings])
+        before, corners = corners, np.array([pixel for pixel, _ in crossings])
         if not np.abs(corners - start).max() < 2 * reach:
             return None
+        if np.abs(corners - before).max() < STANDS_STILL:
+            break
     return TagCorners(corners, np.array([covariance for _, covariance in crossings]))
 
 

@@ -29,7 +29,7 @@ targets_with_symmetries = st.builds(
         [
             lambda rows, columns: CircleGrid(rows=rows, columns=columns, pitch=0.03, disk_diameter=0.01),
             lambda rows, columns: AsymmetricCircleGrid(
-                rows=rows, columns=columns, pitch=0.03, disk_diameter=0.01
+                rows=rows + 1, columns=columns, pitch=0.03, disk_diameter=0.01
             ),
             lambda rows, columns: Chessboard(rows=rows, columns=columns, pitch=0.03),
         ]
@@ -117,8 +117,8 @@ def test_points_run_along_columns_then_rows():
 
 
 def test_every_second_row_of_an_asymmetric_grid_is_shifted_by_half_a_pitch():
-    grid = AsymmetricCircleGrid(rows=3, columns=2, pitch=2.0, disk_diameter=0.5)
-    expected = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [3, 1, 0], [0, 2, 0], [2, 2, 0]]
+    grid = AsymmetricCircleGrid(rows=4, columns=2, pitch=2.0, disk_diameter=0.5)
+    expected = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [3, 1, 0], [0, 2, 0], [2, 2, 0], [1, 3, 0], [3, 3, 0]]
     np.testing.assert_array_equal(target_points(grid), expected)
     assert grid.spacing == pytest.approx(np.linalg.norm([1, 1]))
 
@@ -191,6 +191,7 @@ def test_a_whole_number_is_a_length():
         ({"pitch_std": -1e-6}, "greater than or equal to 0"),
         ({"disk_diameter": 0.03}, r"disk_diameter \(0.03 m\) must be smaller than pitch \(0.03 m\)"),
         ({"kind": "asymmetric_circle_grid", "disk_diameter": 0.022}, "diagonal spacing"),
+        ({"kind": "asymmetric_circle_grid", "rows": 3}, "greater than or equal to 4"),
         ({"kind": "chessboard", "rows": 2}, "greater than or equal to 3"),
         ({"kind": "charuco", "marker": 0.03, "dictionary": "DICT_5X5_100"}, "marker .* smaller than pitch"),
         (
