@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, Any, Literal, NoReturn
 
-from annotated_types import Gt
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?"
@@ -127,6 +126,10 @@ class QuantityType:
     """Annotation that makes a float field of a pydantic model a quantity: text outside, SI inside."""
 
     dimension: Dimension
+    above: float | None = None
+    """A bound (SI) that the quantity exceeds."""
+    at_least: float | None = None
+    """A bound (SI) that it may reach."""
 
     def __get_pydantic_core_schema__(
         self, source: type[Any], handler: GetCoreSchemaHandler
@@ -134,7 +137,7 @@ class QuantityType:
         """Take text, hold a float, and write text into JSON."""
         return core_schema.no_info_before_validator_function(
             self._validate,
-            core_schema.float_schema(),
+            core_schema.float_schema(gt=self.above, ge=self.at_least),
             serialization=core_schema.plain_serializer_function_ser_schema(
                 lambda value: format_quantity(value, self.dimension),
                 return_schema=core_schema.str_schema(),
@@ -156,6 +159,11 @@ class QuantityType:
             raise PydanticCustomError("quantity", "{reason}", {"reason": str(error)}) from error
 
 
+def written(text: str) -> Any:
+    """Return a field's default in the words of a profile, so that its JSON Schema shows it in these words."""
+    return Field(default=text, validate_default=True)
+
+
 Length = Annotated[float, QuantityType(LENGTH)]
 """Metres; written "30 mm"."""
 Angle = Annotated[float, QuantityType(ANGLE)]
@@ -167,8 +175,8 @@ Frequency = Annotated[float, QuantityType(FREQUENCY)]
 Pixels = Annotated[float, QuantityType(PIXELS)]
 """Pixels; written "0.1 px"."""
 
-PositiveLength = Annotated[Length, Gt(0)]
-PositiveAngle = Annotated[Angle, Gt(0)]
-PositiveDuration = Annotated[Duration, Gt(0)]
-PositiveFrequency = Annotated[Frequency, Gt(0)]
-PositivePixels = Annotated[Pixels, Gt(0)]
+PositiveLength = Annotated[float, QuantityType(LENGTH, above=0)]
+PositiveAngle = Annotated[float, QuantityType(ANGLE, above=0)]
+PositiveDuration = Annotated[float, QuantityType(DURATION, above=0)]
+PositiveFrequency = Annotated[float, QuantityType(FREQUENCY, above=0)]
+PositivePixels = Annotated[float, QuantityType(PIXELS, above=0)]

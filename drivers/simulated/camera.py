@@ -10,7 +10,7 @@ from drivers.camera import CameraSpec, Frame
 from drivers.clock import Clock
 from drivers.driver import DriverContext, DriverOptions
 from drivers.errors import DeviceLostError, DeviceTimeoutError, OptionsError
-from drivers.quantities import PositiveDuration
+from drivers.quantities import PositiveDuration, written
 from drivers.simulated.exposure import Exposure
 from drivers.simulated.faults import CameraFault
 from drivers.simulated.world import SimulatedWorld
@@ -22,9 +22,9 @@ _POLL = 0.02
 class SimulatedCameraOptions(DriverOptions):
     """Keys of a camera with `driver = "simulated"`; its lens and pictures are in `[simulation.camera]`."""
 
-    timeout: PositiveDuration = 2.0
+    timeout: PositiveDuration = written("2 s")
     """How long a frame may be overdue."""
-    lateness: PositiveDuration = 1.0
+    lateness: PositiveDuration = written("1 s")
     """How late the fault "late" delivers a frame."""
     fault: CameraFault | None = None
 

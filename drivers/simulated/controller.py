@@ -13,7 +13,7 @@ from drivers.cancellation import finish
 from drivers.clock import Clock
 from drivers.driver import DriverContext, DriverOptions
 from drivers.errors import DriverError, OptionsError
-from drivers.quantities import PositiveDuration, in_reading_unit
+from drivers.quantities import PositiveDuration, in_reading_unit, written
 from drivers.simulated.axis import SimulatedAxis
 from drivers.simulated.device import Device
 from drivers.simulated.faults import AxisFault, DeviceFault, PlannedFault
@@ -24,7 +24,7 @@ from drivers.simulated.world import SimulatedWorld
 class SimulatedControllerOptions(DriverOptions):
     """Keys of `[controllers.NAME]` with `driver = "simulated"`."""
 
-    answer_timeout: PositiveDuration = 1.0
+    answer_timeout: PositiveDuration = written("1 s")
     """How long a device may keep silent before it counts as lost."""
     faults: Annotated[tuple[PlannedFault, ...], Field(strict=False)] = ()
 

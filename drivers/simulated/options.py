@@ -6,13 +6,17 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from drivers.driver import DriverOptions
 from drivers.quantities import (
+    LENGTH,
     NUMBER,
+    PIXELS,
     Angle,
     Length,
     Pixels,
     PositiveDuration,
     PositiveFrequency,
     PositivePixels,
+    QuantityType,
+    written,
 )
 
 Direction = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], Field(strict=False)]
@@ -31,7 +35,7 @@ class SettlingOptions(DriverOptions):
     """The swing when a motion has ended: amplitude x exp(-damping w t) x sin(w t), w = 2 pi frequency."""
 
     amplitude: ReadingText
-    frequency: PositiveFrequency = 8.0
+    frequency: PositiveFrequency = written("8 Hz")
     damping: Annotated[float, Field(gt=0, lt=1)] = 0.1
 
 
@@ -39,7 +43,7 @@ class EccentricityOptions(DriverOptions):
     """A once-per-turn error: the angle u becomes u + amplitude x (sin(u + phase) - sin(phase))."""
 
     amplitude: Angle
-    phase: Angle = 0.0
+    phase: Angle = written("0 deg")
 
 
 class JointOptions(DriverOptions):
@@ -93,13 +97,13 @@ class LensOptions(DriverOptions):
 class PictureOptions(DriverOptions):
     """How a picture is formed behind the lens. Grey levels are of 8 bits."""
 
-    exposure: PositiveDuration = 0.01
-    frame_rate: PositiveFrequency = 30.0
+    exposure: PositiveDuration = written("10 ms")
+    frame_rate: PositiveFrequency = written("30 Hz")
     brightness: Annotated[float, Field(gt=0)] = 1.0
     """Factor on every grey level; what exceeds 255 is saturated."""
     noise: Annotated[float, Field(ge=0)] = 1.0
     """Standard deviation (grey levels)."""
-    defocus: Annotated[Pixels, Field(ge=0)] = 0.5
+    defocus: Annotated[float, QuantityType(PIXELS, at_least=0)] = written("0.5 px")
     """Standard deviation of a Gaussian blur."""
     vignetting: Fraction = 0.0
     """Share of the light that is missing in the picture's corners."""
@@ -140,7 +144,7 @@ class CameraTruth(DriverOptions):
 class PlateOptions(DriverOptions):
     """The sheet that the target is printed on."""
 
-    margin: Annotated[Length, Field(ge=0)] = 0.02
+    margin: Annotated[float, QuantityType(LENGTH, at_least=0)] = written("20 mm")
     """White paper around the pattern."""
     ink: Grey = 25.0
     paper: Grey = 215.0
@@ -148,7 +152,7 @@ class PlateOptions(DriverOptions):
     """Mean grey level of what is behind the plate."""
     print_scale: Annotated[float, Field(gt=0)] = 1.0
     """True size over nominal size: what a printer makes of the drawing."""
-    bulge: Length = 0.0
+    bulge: Length = written("0 mm")
     """How far the middle of the sheet stands out towards the camera; its edges stay in the plane."""
 
 

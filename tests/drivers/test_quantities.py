@@ -14,9 +14,10 @@ numbers = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e12, max_
 
 class Plate(BaseModel):
     pitch: q.PositiveLength
-    tilt: q.Angle = 0.0
+    tilt: q.Angle = q.written("90 deg")
     point: tuple[q.Length, q.Length] | None = None
     exposure: q.PositiveDuration | None = None
+    width: q.PositiveLength = q.written("20 cm")
 
 
 @given(value=numbers, dimension=st.sampled_from(DIMENSIONS))
@@ -111,11 +112,11 @@ def test_an_axis_refuses_other_units_and_says_which_fit(text: str, unit: str, su
 
 
 def test_a_model_holds_si_and_writes_text() -> None:
-    plate = Plate.model_validate({"pitch": "30 mm", "tilt": "90 deg"})
+    plate = Plate.model_validate({"pitch": "30 mm"})
     assert plate.pitch == 0.03
-    assert plate.model_dump() == {"pitch": 0.03, "tilt": math.pi / 2, "point": None, "exposure": None}
+    assert plate.model_dump(exclude_none=True) == {"pitch": 0.03, "tilt": math.pi / 2, "width": 0.2}
     written = plate.model_dump(mode="json", exclude_none=True)
-    assert written == {"pitch": "0.03 m", "tilt": f"{math.pi / 2!r} rad"}
+    assert written == {"pitch": "0.03 m", "tilt": f"{math.pi / 2!r} rad", "width": "0.2 m"}
     assert Plate.model_validate_json(plate.model_dump_json()) == plate
 
 
@@ -135,8 +136,11 @@ def test_a_model_refuses_with_the_plain_sentence() -> None:
 
 
 def test_the_json_schema_has_the_pattern() -> None:
-    pitch = Plate.model_json_schema()["properties"]["pitch"]
+    properties = Plate.model_json_schema()["properties"]
+    pitch = properties["pitch"]
     assert pitch["type"] == "string"
     assert re.search(pitch["pattern"], "30 mm")
     assert not re.search(pitch["pattern"], "30 deg")
     assert not re.search(pitch["pattern"], "30")
+    assert properties["tilt"]["default"] == "90 deg"
+    assert properties["width"]["default"] == "20 cm"
