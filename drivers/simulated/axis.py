@@ -157,6 +157,7 @@ class SimulatedAxis:
                     self._device.fail(fault)
             if not await self._standstill(deadline):
                 self.brake()
+                await self._standstill()
                 raise DeviceTimeoutError(
                     f"axis '{self._spec.name}' still reports motion {deadline - now:.1f} s after it was "
                     f"sent to {target:g} {self._spec.unit}: it was stopped; check that it moves freely"

@@ -15,8 +15,8 @@ Grey = NDArray[np.float32]
 _VISIBLE = 0.02
 """Pixels of motion during an exposure below which the camera counts as standing."""
 _STEP = 0.5
-"""Pixels between two instants of a blurred picture, as far as `_INSTANTS` allows."""
-_INSTANTS = 16
+"""Pixels between two instants of a blurred picture, as far as `_INSTANTS` allows: each costs a rendering."""
+_INSTANTS = 8
 
 
 class Exposure:

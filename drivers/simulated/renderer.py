@@ -23,6 +23,8 @@ _SAMPLES = 64
 """Rays in a pixel that has a corner of the pattern in it."""
 _BATCH = 2048
 """Such pixels sampled at a time, so that their rays stay in the processor's cache."""
+_BAND = 32
+"""Rows cast at a time, for the same reason."""
 _BACKGROUND_STEP = 16
 """Pixels between the places where the smooth background is computed."""
 
@@ -48,9 +50,12 @@ class Renderer:
         if left >= right or top >= bottom:
             return picture
         caster = Caster(self.plate, world_from_camera)
-        seen = (slice(top + 1, bottom + 1), slice(left + 1, right + 1))
-        depths = caster.depths(rays.x[seen], rays.y[seen])
-        ink, paper = (np.greater(depth, 0).astype(np.float32) for depth in depths)
+        ink, paper = np.empty((2, bottom - top, right - left), np.float32)
+        for first in range(top, bottom, _BAND):
+            band = slice(first, min(first + _BAND, bottom))
+            seen = (slice(band.start + 1, band.stop + 1), slice(left + 1, right + 1))
+            drawn = slice(band.start - top, band.stop - top)
+            ink[drawn], paper[drawn] = (depth > 0 for depth in caster.depths(rays.x[seen], rays.y[seen]))
         rows, columns = np.nonzero(_on_edges(ink + paper))
         pixels = (rows + top + 1, columns + left + 1)
         ink[rows, columns], paper[rows, columns] = _shares(caster, rays, pixels)

@@ -42,8 +42,8 @@ class Charuco(Pattern):
         u, v = x + self.pitch, y + self.pitch  # from the board's top left
         column, row, inset = cells(u, v, self.pitch)
         # Markers are numbered along the white squares, row by row.
-        markers_above = (np.arange(self.rows) * self.columns) // 2
-        first_white = (np.arange(self.rows) + 1) % 2
+        markers_above = (np.arange(self.rows, dtype=np.int32) * self.columns) // 2
+        first_white = (np.arange(self.rows, dtype=np.int32) + 1) % 2
         r = np.clip(row, 0, self.rows - 1)
         number = markers_above[r] + (column - first_white[r]) // 2
         edge = (self.pitch - self.marker) / 2
