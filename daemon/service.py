@@ -19,7 +19,7 @@ from daemon.live_picture import LivePicture
 from daemon.pose import PoseService
 from daemon.procedure import RunManager
 from daemon.profile import Profile
-from daemon.rig import Rig
+from daemon.rig import Devices, Rig
 from daemon.store import CalibrationRecord, Store
 from daemon.streams import Streams
 
@@ -68,9 +68,10 @@ class Service:
     async def halt(self) -> None:
         """End streams, motions and the run, and return when the axes stand."""
         self.streams.close()
+        # Before the latch, which would fail the run rather than interrupt it.
+        await self.runs.close()
         self.rig.latch.engage("the daemon is shutting down")
         await self.motions.close()
-        await self.runs.close()
         self.leases.close()
 
     def _use(self, record: CalibrationRecord, calibration: Calibration) -> None:
@@ -78,15 +79,19 @@ class Service:
 
 
 @contextlib.asynccontextmanager
-async def running_service(profile: Profile, data: Path) -> AsyncIterator[Service]:
+async def running_service(
+    profile: Profile, data: Path, devices: Devices | None = None
+) -> AsyncIterator[Service]:
     """Open the rig of `profile` and what is stored in `data`; on leaving, the axes are stopped and let go.
+
+    `devices` are the profile's own unless given.
 
     Raises StoreError and OptionsError. A device that is not there is no error: it is looked for until it is.
     """
     async with contextlib.AsyncExitStack() as stack:
         store = await Store.open(data)
         stack.push_async_callback(store.close)
-        rig = await Rig.open(profile)
+        rig = await Rig.open(profile, devices)
         stack.push_async_callback(rig.close)
         service = Service(profile, rig, store)
         stack.push_async_callback(service.halt)

@@ -7,7 +7,8 @@ stop_latch        nothing moves after a stop before it is acknowledged
 rig               all of it together
 """
 
+from daemon.rig.devices import Devices, make_devices
 from daemon.rig.rig import Rig
 from daemon.rig.snapshot import AxisSnapshot, DeviceSnapshot, RigSnapshot
 
-__all__ = ["AxisSnapshot", "DeviceSnapshot", "Rig", "RigSnapshot"]
+__all__ = ["AxisSnapshot", "DeviceSnapshot", "Devices", "Rig", "RigSnapshot", "make_devices"]

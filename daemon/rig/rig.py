@@ -52,13 +52,13 @@ class Rig:
         self.snapshot = self._compose()
 
     @classmethod
-    async def open(cls, profile: Profile) -> Self:
-        """Make the profile's devices and try to connect each of them once; moves nothing.
+    async def open(cls, profile: Profile, devices: Devices | None = None) -> Self:
+        """Make the profile's devices, unless given, and try to connect each of them once; moves nothing.
 
         A device that is not there is stated in the snapshot, and looked for until it is.
         Raises OptionsError where a driver cannot do what the profile asks.
         """
-        rig = cls(profile, make_devices(profile))
+        rig = cls(profile, make_devices(profile) if devices is None else devices)
         owners = [*rig._controllers, rig._camera]
         rig._tasks = [asyncio.create_task(owner.run(), name=f"owner of {owner.name}") for owner in owners]
         try:

@@ -1,0 +1,52 @@
+"""A small simulated rig in operation, in process, for each test that asks."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from daemon.api import create_app
+from daemon.profile import Profile
+from daemon.rig import Devices, Rig, make_devices
+from daemon.service import Service, running_service
+from tests.daemon.rigs import small_rig
+
+
+@pytest.fixture
+def profile(tmp_path: Path) -> Profile:
+    return small_rig(tmp_path)
+
+
+@pytest.fixture
+def devices(profile: Profile) -> Devices:
+    return make_devices(profile)
+
+
+@pytest.fixture
+async def rig(profile: Profile, devices: Devices) -> AsyncIterator[Rig]:
+    rig = await Rig.open(profile, devices)
+    yield rig
+    await rig.close()
+    assert_nothing_left()
+
+
+@pytest.fixture
+async def service(profile: Profile, devices: Devices, tmp_path: Path) -> AsyncIterator[Service]:
+    async with running_service(profile, tmp_path / "data", devices) as service:
+        yield service
+    assert_nothing_left()
+
+
+@pytest.fixture
+async def client(service: Service) -> AsyncIterator[httpx.AsyncClient]:
+    transport = httpx.ASGITransport(create_app(service))
+    async with httpx.AsyncClient(transport=transport, base_url="http://rig/api/v1") as client:
+        yield client
+
+
+def assert_nothing_left() -> None:
+    """No task of the daemon's outlives it."""
+    left = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
+    assert not [task for task in left if "owner of" in task.get_name() or "run " in task.get_name()], left
