@@ -48,7 +48,6 @@ class RunManager:
             record = self._new_record(owner, note)
             lease = self._leases.hand_over(f"run {record.id}", note, token)
             try:
-                await asyncio.to_thread(self._store.session_folder(record).mkdir, parents=True)
                 await self._store.add_run(record)
             except BaseException:
                 self._leases.release(lease.token)

@@ -44,6 +44,7 @@ class Run:
         self._gate = Gate()
         self._ending = RunState.CANCELLED, "it was cancelled"
         self._task: asyncio.Task[None] | None = None
+        self._begun = asyncio.Event()
 
     def start(self) -> asyncio.Task[None]:
         """Begin; the task ends with the run and never fails."""
@@ -67,10 +68,13 @@ class Run:
         if self._task is None or self._task.done():
             return
         self._ending = state, why
+        # A task that is cancelled before its first step would never come to its end's duties.
+        await self._begun.wait()
         self._task.cancel()
         await asyncio.wait([self._task])
 
     async def _execute(self) -> None:
+        self._begun.set()
         state, error, conclusion = RunState.SUCCEEDED, None, None
         try:
             conclusion = await self._work()
@@ -86,9 +90,9 @@ class Run:
         await finish(self._conclude(state, error, conclusion))
 
     async def _work(self) -> Conclusion:
-        self.log.add(StateChanged(state=RunState.RUNNING))
         empty = self._rig.profile.empty_session()
         writer = await finish(asyncio.to_thread(SessionWriter, self.folder, empty))
+        self.log.add(StateChanged(state=RunState.RUNNING))
         await Survey(self._rig, writer, self.log, self._checkpoint).take()
         return await conclude(self.folder, self.log)
 

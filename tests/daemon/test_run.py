@@ -1,0 +1,294 @@
+"""A whole run in process, and the ways in which it ends before its time."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from calib import load_calibration, load_session
+from calib.detection import Detection, detect
+from calib.errors import DetectionError, UnsolvableError
+from calib.targets import Target
+from daemon.errors import LeaseHeldError, RigFaultError, RunActiveError, RunStateError, StopLatchedError
+from daemon.procedure import RunEvent
+from daemon.procedure.event_log import read_events
+from daemon.profile import Profile
+from daemon.rig import Devices
+from daemon.service import Service, running_service
+from daemon.store import RunRecord, RunState
+from drivers.simulated import SimulatedController
+from tests.daemon.motions import until
+from tests.daemon.rigs import LOOKING_AWAY, small_rig
+
+Look = Callable[[NDArray[Any], Target], Detection]
+
+
+async def finish(service: Service, run: RunRecord) -> tuple[RunRecord, list[RunEvent]]:
+    events = [event async for event in service.runs.events(run.id)]
+    return await service.runs.get(run.id), events
+
+
+def of(events: list[RunEvent], kind: str) -> list[Any]:
+    return [event for event in events if event.type == kind]
+
+
+async def test_a_run_ends_with_an_active_calibration(service: Service) -> None:
+    run, events = await finish(service, await service.runs.start("anna", "first light"))
+    assert run.state is RunState.SUCCEEDED
+    assert run.error is None
+    assert [event.sequence for event in events] == list(range(1, len(events) + 1))
+    assert [event.type for event in events[:4]] == ["state", "plan", "homing", "homing"]
+    assert [event.joint for event in of(events, "joint")] == ["slide", "pan", None]
+    assert events[1].type == "plan"
+    assert events[1].views == len(of(events, "moving")) == len(of(events, "view")) == 10
+    assert of(events, "solved")[0].quality["rms_px"] < 0.2
+    assert of(events, "verification")[0].result["views"] == 2
+    assert events[-1].type == "finished"
+    assert events[-1].calibration_id == run.calibration_id == service.poses.calibration_id
+
+    folder = service.store.session_folder(run)
+    assert read_events(folder) == events
+    document = json.loads((folder / "session.json").read_text())
+    assert document["complete"] is True
+    assert run.calibration_id is not None
+    stored = await service.store.calibration(run.calibration_id)
+    assert json.loads(stored.document) == json.loads((folder / "calibration.json").read_text())
+    assert load_calibration(folder / "calibration.json").method == "closed_form"
+
+
+async def test_a_view_says_how_it_was_taken(service: Service) -> None:
+    run, _ = await finish(service, await service.runs.start())
+    session = load_session(service.store.session_folder(run))
+    assert [view.use for view in session.views] == ["fit"] * 8 + ["verify"] * 2
+    # The slide grows through its sweep; the pan goes down to its start first, and grows from there.
+    assert [view.approached[0] for view in session.views[1:4] if view.approached] == [1, 1, 1]
+    assert [view.approached[1] for view in session.views[4:8] if view.approached] == [-1, 1, 1, 1]
+    for view in session.views:
+        extra = view.model_extra or {}
+        assert extra["time"].endswith("Z")
+        assert extra["settle"]["settled_s"] >= 0.1
+        assert view.image is not None
+        picture = cv2.imread(str(session.folder / view.image))
+        assert picture is not None
+        assert picture.shape[:2] == (360, 480)
+    assert np.allclose(
+        [view.readings[0] for view in session.views[:4]], [0, 100 / 3, 200 / 3, 100], atol=0.05
+    )
+
+
+async def test_there_is_one_run_at_a_time_under_its_own_lease(service: Service) -> None:
+    run = await service.runs.start()
+    with pytest.raises(RunActiveError, match=run.id):
+        await service.runs.start()
+    with pytest.raises(LeaseHeldError, match=f"run {run.id}"):
+        service.leases.acquire("anna", "", 60)
+    await service.runs.cancel(run.id)
+    assert service.leases.current is None
+    with pytest.raises(RunStateError, match="not under way"):
+        await service.runs.cancel(run.id)
+
+
+async def test_a_run_that_cannot_start_leaves_no_trace(service: Service, devices: Devices) -> None:
+    await service.rig.stop("a test")
+    with pytest.raises(StopLatchedError):
+        await service.runs.start()
+    service.rig.acknowledge_stop()
+    lease = service.leases.acquire("anna", "", 60)
+    with pytest.raises(LeaseHeldError, match="'anna'"):
+        await service.runs.start()
+    service.leases.release(lease.token)
+    cast(SimulatedController, devices.controllers["head"]).inject("lost")
+    await until(service.rig, lambda snapshot: bool(snapshot.problems))
+    with pytest.raises(RigFaultError, match="controller 'head' is lost"):
+        await service.runs.start()
+    assert await service.runs.list() == []
+    assert service.leases.current is None
+
+
+async def test_a_paused_run_rests_between_two_views_and_goes_on(service: Service) -> None:
+    run = await service.runs.start()
+    seen: list[RunEvent] = []
+    async for event in service.runs.events(run.id):
+        seen.append(event)
+        if event.type == "view" and event.view == 1:
+            service.runs.pause(run.id)
+            with pytest.raises(RunStateError, match="is paused"):
+                service.runs.pause(run.id)
+        if event.type == "state" and event.state is RunState.PAUSED:
+            assert (await service.store.run(run.id)).state is RunState.PAUSED
+            assert not service.rig.snapshot.moving
+            service.runs.resume(run.id)
+            with pytest.raises(RunStateError, match="not paused"):
+                service.runs.resume(run.id)
+    assert [event.state for event in of(seen, "state")] == ["running", "paused", "running"]
+    # At most the view in flight came between the asking and the rest.
+    assert seen.index(of(seen, "state")[1]) - seen.index(of(seen, "view")[1]) <= 3
+    assert (await service.runs.get(run.id)).state is RunState.SUCCEEDED
+
+
+async def test_a_paused_run_can_be_cancelled(service: Service) -> None:
+    run = await service.runs.start()
+    service.runs.pause(run.id)
+    async for event in service.runs.events(run.id):
+        if event.type == "state" and event.state is RunState.PAUSED:
+            break
+    assert (await service.runs.cancel(run.id)).state is RunState.CANCELLED
+
+
+async def test_a_stop_fails_the_run_and_leaves_its_views(service: Service) -> None:
+    run = await service.runs.start()
+    async for event in service.runs.events(run.id):
+        if event.type == "view" and event.view == 1:
+            await service.rig.stop("somebody pressed the button")
+    run = await service.runs.get(run.id)
+    assert run.state is RunState.FAILED
+    assert "stop" in (run.error or "")
+    assert len(load_session(service.store.session_folder(run)).views) >= 2
+    assert service.poses.calibration_id is None
+
+
+async def test_a_device_lost_in_the_middle_fails_the_run_in_its_words(
+    service: Service, devices: Devices
+) -> None:
+    run = await service.runs.start()
+    async for event in service.runs.events(run.id):
+        if event.type == "view" and event.view == 1:
+            cast(SimulatedController, devices.controllers["stage"]).inject("lost")
+    run = await service.runs.get(run.id)
+    assert run.state is RunState.FAILED
+    assert "controller" in (run.error or "")
+    assert "could not be confirmed" in (run.error or "")  # nobody can say that a lost axis stands
+
+
+async def test_a_shutdown_interrupts_the_run(profile: Profile, tmp_path: Path) -> None:
+    async with running_service(profile, tmp_path / "data") as service:
+        run = await service.runs.start()
+        async for event in service.runs.events(run.id):
+            if event.type == "view":
+                break
+    async with running_service(profile, tmp_path / "data") as service:
+        (run,) = await service.runs.list()
+        assert run.state is RunState.INTERRUPTED
+        assert "shut down" in (run.error or "")
+        past = [event async for event in service.runs.events(run.id, after=2)]
+        assert past[0].sequence == 3
+        assert past[-1].type == "finished"
+
+
+class TestATargetHardToSee:
+    """Pictures in which the target is not found."""
+
+    @pytest.fixture
+    def blind(self, monkeypatch: pytest.MonkeyPatch) -> Callable[[set[int]], None]:
+        """Let the n-th looks, counted from 1, find nothing."""
+
+        def be_blind(at: set[int]) -> None:
+            looks = iter(range(1, 1000))
+
+            def look(image: NDArray[Any], target: Target) -> Detection:
+                if next(looks) in at:
+                    raise DetectionError("somebody stood in front of it")
+                return detect(image, target)
+
+            monkeypatch.setattr("daemon.procedure.observation.detect", look)
+
+        return be_blind
+
+    async def test_a_second_look_is_taken(self, service: Service, blind: Callable[[set[int]], None]) -> None:
+        blind({2})
+        run, events = await finish(service, await service.runs.start())
+        assert run.state is RunState.SUCCEEDED
+        assert of(events, "warning") == []
+        assert len(of(events, "view")) == 10
+
+    async def test_a_position_is_left_out_after_two(
+        self, service: Service, blind: Callable[[set[int]], None]
+    ) -> None:
+        blind({2, 3})
+        run, events = await finish(service, await service.runs.start())
+        assert run.state is RunState.SUCCEEDED
+        (warning,) = of(events, "warning")
+        assert warning.message == "position 2 of 10 is left out: somebody stood in front of it"
+        session = load_session(service.store.session_folder(run))
+        assert len(session.views) == 9
+        assert [view.image for view in session.views] == [f"frames/{index:04d}.png" for index in range(9)]
+
+    async def test_a_sweep_with_one_view_fails_the_run(
+        self, service: Service, blind: Callable[[set[int]], None]
+    ) -> None:
+        blind(set(range(2, 9)))
+        run, _ = await finish(service, await service.runs.start())
+        assert run.state is RunState.FAILED
+        assert "found at 1 of 4 positions of 'slide'" in (run.error or "")
+
+    @pytest.mark.parametrize("profile", [LOOKING_AWAY], indirect=True)
+    async def test_a_target_never_seen_fails_the_run(self, service: Service) -> None:
+        run, events = await finish(service, await service.runs.start())
+        assert run.state is RunState.FAILED
+        assert "found at 0 of 4 positions of 'slide'" in (run.error or "")
+        assert len(of(events, "warning")) == 4
+        assert events[-1].type == "finished"
+        assert events[-1].error == run.error
+
+    @pytest.fixture
+    def profile(self, tmp_path: Path, request: pytest.FixtureRequest) -> Profile:
+        if hasattr(request, "param"):
+            return small_rig(tmp_path, look_at=request.param)
+        return small_rig(tmp_path)
+
+
+async def test_a_session_that_cannot_be_solved_fails_the_run_and_stays(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def solve(*_: object, **__: object) -> None:
+        raise UnsolvableError("joint 'pan' does not turn far enough: sweep it further")
+
+    monkeypatch.setattr("calib.solver.solve", solve)
+    run, _ = await finish(service, await service.runs.start())
+    assert run.state is RunState.FAILED
+    assert run.error == "joint 'pan' does not turn far enough: sweep it further"
+    assert await service.store.calibrations() == []
+    assert len(load_session(service.store.session_folder(run)).views) == 10
+
+
+async def test_a_full_disk_fails_the_run_and_leaves_a_session_that_loads(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    run = await service.runs.start()
+    async for event in service.runs.events(run.id):
+        if event.type == "view" and event.view == 1:
+            monkeypatch.setattr("calib.session_writer.write_durably", full)
+    run = await service.runs.get(run.id)
+    assert run.state is RunState.FAILED
+    assert "No space left on device" in (run.error or "")
+    assert len(load_session(service.store.session_folder(run)).views) == 2
+
+
+async def test_an_error_in_the_program_fails_the_run_too(
+    service: Service, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def look(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("daemon.procedure.observation.detect", look)
+    run, _ = await finish(service, await service.runs.start())
+    assert run.state is RunState.FAILED
+    assert "ZeroDivisionError" in (run.error or "")
+    assert "Traceback" in caplog.text
+    assert service.leases.current is None
+
+
+async def test_a_folder_that_cannot_be_made_fails_the_run(service: Service, tmp_path: Path) -> None:
+    (tmp_path / "data" / "sessions").write_text("a file is in the way")
+    run, events = await finish(service, await service.runs.start())
+    assert run.state is RunState.FAILED
+    assert "the session could not be written" in (run.error or "")
+    assert events[-1].type == "finished"
