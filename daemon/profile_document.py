@@ -1,10 +1,13 @@
 """The profile as the daemon shows and stores it: without its drivers' options and a simulation's truth."""
 
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from daemon.profile import Profile
+
+Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
+"""The lowest and highest reading that an axis may be sent to."""
 
 
 class AxisDocument(BaseModel):
@@ -15,7 +18,7 @@ class AxisDocument(BaseModel):
     name: str
     kind: Literal["revolute", "prismatic"]
     unit: str
-    limits: tuple[float, float]
+    limits: Limits
     velocity: float
     acceleration: float
     tolerance: float
@@ -103,7 +106,7 @@ def _axes(profile: Profile) -> list[AxisDocument]:
             name=axis.spec.name,
             kind=axis.spec.kind,
             unit=axis.spec.unit,
-            limits=axis.spec.limits,
+            limits=list(axis.spec.limits),
             velocity=axis.spec.velocity,
             acceleration=axis.spec.acceleration,
             tolerance=axis.spec.tolerance,

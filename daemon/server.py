@@ -6,7 +6,7 @@ import ipaddress
 import logging
 import signal
 import socket
-from collections.abc import Callable, Generator
+from collections.abc import AsyncIterator, Callable, Generator
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -97,8 +97,12 @@ async def _serve(
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, main.cancel)
     try:
-        async with running_service(profile, data) as service:
-            await _serve_service(service, listening, on_ready)
+        async with running_service(profile, data) as service, serving(service, listening) as server:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                loop.add_signal_handler(number, server.handle_exit, number, None)
+            if on_ready is not None:
+                on_ready(address_of(listening))
+            await server.exit_asked.wait()
     except asyncio.CancelledError:
         logger.info("ended before it was ready")
     finally:
@@ -106,10 +110,10 @@ async def _serve(
             loop.remove_signal_handler(number)
 
 
-async def _serve_service(
-    service: Service, listening: socket.socket, on_ready: Callable[[str], None] | None
-) -> None:
-    from daemon.api import create_app  # FastAPI takes its time to import, and a port in use needs none
+@contextlib.asynccontextmanager
+async def serving(service: Service, listening: socket.socket) -> AsyncIterator[Server]:
+    """Answer requests to `service` on a bound socket; on leaving, the axes are stopped before all else."""
+    from daemon.api import create_app  # FastAPI takes its time to import, and a port in use needs none of it
 
     config = uvicorn.Config(
         create_app(service),
@@ -119,21 +123,15 @@ async def _serve_service(
         timeout_graceful_shutdown=GRACE,
     )
     server = Server(config, service)
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, server.handle_exit, number, None)
-    serving = asyncio.create_task(server.serve(sockets=[listening]))
-    exit_asked = asyncio.create_task(server.exit_asked.wait())
+    task = asyncio.create_task(server.serve(sockets=[listening]))
+    task.add_done_callback(lambda _: server.exit_asked.set())
     try:
-        if on_ready is not None:
-            on_ready(address_of(listening))
-        await asyncio.wait({serving, exit_asked}, return_when=asyncio.FIRST_COMPLETED)
-        # The axes come first: they must not go on moving while connections are drained.
-        await service.halt()
+        yield server
     finally:
-        exit_asked.cancel()
         server.handle_exit(signal.SIGTERM, None)
-        await serving
+        # The axes must not go on moving while connections are drained.
+        await service.halt()
+        await task
 
 
 def address_of(listening: socket.socket) -> str:

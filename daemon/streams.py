@@ -31,15 +31,17 @@ class Streams:
             try:
                 while not self._closing.is_set():
                     waiting: set[asyncio.Future[Any]] = {closing, upcoming}
-                    await asyncio.wait(waiting, timeout=HEARTBEAT, return_when=asyncio.FIRST_COMPLETED)
-                    if not upcoming.done():
+                    done, _ = await asyncio.wait(
+                        waiting, timeout=HEARTBEAT, return_when=asyncio.FIRST_COMPLETED
+                    )
+                    if not done:
                         yield None
-                        continue
-                    item = upcoming.result()
-                    if isinstance(item, _End):
-                        return
-                    yield item
-                    upcoming = asyncio.ensure_future(anext(items, _END))
+                    if upcoming in done:
+                        item = upcoming.result()
+                        if isinstance(item, _End):
+                            return
+                        yield item
+                        upcoming = asyncio.ensure_future(anext(items, _END))
             finally:
                 for task in (closing, upcoming):
                     task.cancel()

@@ -6,6 +6,7 @@ from typing import Literal, Self
 from pydantic import BaseModel, Field
 
 from daemon.lease import Lease
+from daemon.profile_document import Limits
 from daemon.rig import AxisSnapshot, DeviceSnapshot
 from daemon.rig.stop_latch import StopLatch
 from daemon.service import Service
@@ -22,7 +23,7 @@ class AxisDocument(BaseModel):
     )
     homed: bool
     moving: bool
-    limits: tuple[float, float] = Field(examples=[[-20.0, 20.0]])
+    limits: Limits = Field(examples=[[-20.0, 20.0]])
     tolerance: float = Field(
         description="How far from its target it may stand after a move.", examples=[0.05]
     )
@@ -40,7 +41,7 @@ class AxisDocument(BaseModel):
             position=axis.position,
             homed=axis.homed,
             moving=axis.moving,
-            limits=axis.spec.limits,
+            limits=list(axis.spec.limits),
             tolerance=axis.spec.tolerance,
             fault=axis.fault,
             lost=axis.lost,

@@ -27,7 +27,7 @@ class PoseService:
         self._rig = rig
         self._active: ActiveCalibration | None = None
         self._written: dict[str | None, tuple[RigSnapshot, bytes]] = {}
-        """For each camera, the answer to the latest snapshot but for its age, which alone goes on changing."""
+        """For each camera, the answer to the latest snapshot but for its age, which goes on changing."""
 
     @property
     def calibration_id(self) -> str | None:
