@@ -65,12 +65,7 @@ class AprilGrid(Pattern):
     kind: Literal["aprilgrid"]
     tag: Size
     spacing: Size
-    family: Literal["16h5", "25h9", "36h10", "36h11"] = "36h11"
-
-    @property
-    def dictionary(self) -> str:
-        """OpenCV's name of the family."""
-        return f"DICT_APRILTAG_{self.family}"
+    dictionary: str = "DICT_APRILTAG_36h11"
 
     def marker_count(self) -> int:
         """Return how many tags there are, with numbers from 0."""
