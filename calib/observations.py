@@ -22,7 +22,8 @@ class Observation:
     """One view's measurement.
 
     `ids` (n,) and `pixels` (n, 2) are points of the target and where they are seen, `disk` whether these are
-    centroids of disks. `pose` is the camera's pose where another system gave it, else None.
+    centroids of disks, `covariances` (n, 2, 2) theirs in px^2 where known. `pose` is the camera's pose where
+    another system gave it, else None.
     """
 
     view: int
@@ -30,13 +31,15 @@ class Observation:
     ids: NDArray[np.int64]
     pixels: Array
     disk: bool
+    covariances: Array | None = None
     pose: Array | None = None
 
     def turned(self, symmetry: TargetSymmetry) -> "Observation":
         """Return the same picture read the other way round that `symmetry` allows."""
         label = np.argsort(symmetry.permutation)[self.ids]
         order = np.argsort(label)
-        return replace(self, ids=label[order], pixels=self.pixels[order])
+        covariances = None if self.covariances is None else self.covariances[order]
+        return replace(self, ids=label[order], pixels=self.pixels[order], covariances=covariances)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +88,14 @@ def _observation(session: Session, index: int, view: View) -> Observation:
         pixels = np.array(view.points.pixels, dtype=float).reshape(-1, 2)
         return Observation(index, camera, ids, pixels, disk=view.points.disk == "centroid")
     detection = detect(read_picture(session, view), session.target)
-    return Observation(index, camera, detection.ids, detection.pixels, disk=detection.disk == "centroid")
+    return Observation(
+        view=index,
+        camera=camera,
+        ids=detection.ids,
+        pixels=detection.pixels,
+        disk=detection.disk == "centroid",
+        covariances=detection.covariances,
+    )
 
 
 def read_picture(session: Session, view: View) -> NDArray[np.uint8]:

@@ -1,0 +1,99 @@
+"""Levenberg and Marquardt's way down, which never returns a worse likelihood than it started from."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.likelihood.measurements import PointViews
+from calib.likelihood.normal import NormalEquations, normal_equations
+from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, evaluate, offsets_at
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 60
+MOST_ROUNDS = 5
+CONVERGED = 1e-4
+"""What a further step would gain, in units of one measurement's mean cost, below which a round is over."""
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where the way down ended, with the likelihood and its normal equations there."""
+
+    estimate: Estimate
+    evaluation: Evaluation
+    equations: NormalEquations
+    converged: bool
+
+
+def descend(problem: Problem, start: Estimate, weights: Weights) -> Descent:
+    """Return the most likely estimate that is found going down from `start`.
+
+    What centroids of disks are off by hardly depends on the estimate: it is held while going down, and taken anew
+    until it no longer matters.
+    """
+    estimate = start
+    for _ in range(MOST_ROUNDS):
+        offsets = offsets_at(problem, estimate)
+        estimate, evaluation, converged = _round(problem, estimate, weights, offsets)
+        renewed = offsets_at(problem, estimate)
+        if all(_close(old, new) for old, new in zip(offsets, renewed, strict=True)):
+            break
+    return Descent(estimate, evaluation, normal_equations(problem, estimate, evaluation), converged)
+
+
+def _close(old: Array | None, new: Array | None) -> bool:
+    return old is None or new is None or bool(np.nanmax(np.abs(old - new), initial=0) < 1e-4)
+
+
+def _round(
+    problem: Problem, estimate: Estimate, weights: Weights, offsets: tuple[Array | None, ...]
+) -> tuple[Estimate, Evaluation, bool]:
+    evaluation = evaluate(problem, estimate, weights, offsets)
+    enough = CONVERGED / max(count_measurements(problem, weights), 1)
+    damping, growth = 1e-6, 4.0
+    for _ in range(MOST_STEPS):
+        equations = normal_equations(problem, estimate, evaluation)
+        while True:
+            step = solve_damped(equations, problem.free, damping)
+            candidate = stepped(problem, estimate, equations, step)
+            there = evaluate(problem, candidate, weights, offsets)
+            if there.cost <= evaluation.cost:
+                break
+            damping, growth = damping * growth, growth * 2
+            if damping > 1e12:
+                return estimate, evaluation, True
+        gain = -float(step @ equations.gradient)
+        estimate, evaluation = candidate, there
+        damping, growth = max(damping / 10, 1e-12), 4.0
+        if gain <= enough * evaluation.cost:
+            return estimate, evaluation, True
+    return estimate, evaluation, False
+
+
+def count_measurements(problem: Problem, weights: Weights) -> int:
+    """Return how many numbers were measured and count: two a point, six a given pose."""
+    return sum(
+        (2 if isinstance(group.data, PointViews) else 6) * int((weight > 0).sum())
+        for group, weight in zip(problem.groups, weights.groups, strict=True)
+    )
+
+
+def solve_damped(equations: NormalEquations, free: NDArray[np.bool_], damping: float) -> Array:
+    """Return the step (p,) downwards, zero where nothing is free; units are taken out by the information's diagonal."""
+    step = np.zeros(len(free))
+    information = equations.information[np.ix_(free, free)]
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information * np.outer(scale, scale) + damping * np.eye(len(scale))
+    step[free] = -scale * np.linalg.lstsq(scaled, scale * equations.gradient[free], rcond=1e-14)[0]
+    return step
+
+
+def stepped(problem: Problem, estimate: Estimate, equations: NormalEquations, step: Array) -> Estimate:
+    """Return the estimate after a step of the parameters, its reading errors following."""
+    errors = estimate.reading_errors.copy()
+    for group, elimination in zip(problem.groups, equations.eliminations, strict=True):
+        noisy = np.flatnonzero(problem.reading_std[: group.link] > 0)
+        errors[np.ix_(elimination.views, noisy)] += elimination.offset + elimination.slope @ step
+    return replace(estimate, state=estimate.state.moved(step, problem.layout), reading_errors=errors)

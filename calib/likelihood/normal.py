@@ -1,0 +1,88 @@
+"""The normal equations: every view's information, mapped to the parameters, its reading errors eliminated."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.likelihood.measurements import PointViews
+from calib.likelihood.problem import Estimate, Evaluation, Group, GroupTerms, Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """A group's reading errors in terms of a step of the parameters: `offset` (n, j) + `slope` (n, j, p) step.
+
+    j counts the noisy joints.
+    """
+
+    views: NDArray[np.intp]
+    offset: Array
+    slope: Array
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Half the cost near an estimate: `gradient` (p,) and `information` (p, p) with fixed parameters left at rest."""
+
+    information: Array
+    gradient: Array
+    eliminations: tuple[Elimination, ...]
+
+
+def normal_equations(problem: Problem, estimate: Estimate, evaluation: Evaluation) -> NormalEquations:
+    """Return the normal equations of all groups and priors."""
+    count = len(problem.layout)
+    information, gradient = np.zeros((count, count)), np.zeros(count)
+    eliminations = []
+    for group, terms in zip(problem.groups, evaluation.terms, strict=True):
+        local = local_by_parameter(problem, group, terms)
+        hessian, slope, elimination = _without_reading_errors(problem, estimate, group, terms, local)
+        information += np.einsum("ndp,nde,neq->pq", local, hessian, local, optimize=True)
+        gradient += np.einsum("ndp,nd->p", local, slope)
+        eliminations.append(elimination)
+    for prior in problem.priors:
+        part = problem.layout.lenses[prior.camera]
+        lens = estimate.state.lenses[prior.camera]
+        assert lens is not None
+        information[part, part] += prior.information
+        gradient[part] += prior.information @ (lens - prior.mean)
+    return NormalEquations(information, gradient, tuple(eliminations))
+
+
+def local_by_parameter(problem: Problem, group: Group, terms: GroupTerms) -> Array:
+    """Return how each view's local vector changes with the parameters (n, d, p)."""
+    layout, by_pose = problem.layout, terms.chain.by_parameter
+    if not isinstance(group.data, PointViews):
+        return by_pose
+    lens, warp = layout.lenses[group.camera], layout.warp
+    numbers = lens.stop - lens.start + warp.stop - warp.start
+    local = np.zeros((len(by_pose), 6 + numbers, len(layout)))
+    local[:, :6] = by_pose
+    for row, column in enumerate([*range(lens.start, lens.stop), *range(warp.start, warp.stop)]):
+        local[:, 6 + row, column] = 1
+    return local
+
+
+def _without_reading_errors(
+    problem: Problem, estimate: Estimate, group: Group, terms: GroupTerms, local: Array
+) -> tuple[Array, Array, Elimination]:
+    """Return hessian (n, d, d) and gradient (n, d) with each view's reading errors at their best (Schur)."""
+    hessian, gradient, views = terms.blocks.hessian, terms.blocks.gradient, group.data.views
+    noisy = np.flatnonzero(problem.reading_std[: group.link] > 0)
+    if not len(noisy):
+        nothing = np.zeros((len(views), 0))
+        return hessian, gradient, Elimination(views, nothing, np.zeros((*nothing.shape, len(problem.layout))))
+    by_reading = terms.chain.by_reading[:, :, noisy]
+    precision = problem.reading_std[noisy] ** -2.0
+    transposed = np.swapaxes(by_reading, 1, 2)
+    mixed = hessian[:, :, :6] @ by_reading
+    own = transposed @ mixed[:, :6] + np.diag(precision)
+    pull = (transposed @ gradient[:, :6, None])[..., 0] + precision * estimate.reading_errors[views][:, noisy]
+    gain = np.linalg.solve(own, np.swapaxes(mixed, 1, 2))
+    offset = -np.linalg.solve(own, pull[..., None])[..., 0]
+    reduced = hessian - mixed @ gain
+    slope = gradient + (mixed @ offset[..., None])[..., 0]
+    return reduced, slope, Elimination(views, offset, -gain @ local)

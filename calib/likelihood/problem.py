@@ -1,0 +1,152 @@
+"""The likelihood: which measurements there are, what is free, and what is known beforehand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.likelihood.blocks import Blocks, disk_offsets, point_blocks, pose_blocks
+from calib.likelihood.chain_terms import ChainTerms, chain_terms
+from calib.likelihood.lens_terms import lens_from_vector
+from calib.likelihood.measurements import GivenPoses, PointViews
+from calib.likelihood.state import Layout, State
+from calib.session import Intrinsics
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Views of one camera that carry one kind of measurement; `link` joints move it, `lens` names its model."""
+
+    camera: int
+    link: int
+    lens: Intrinsics | None
+    data: PointViews | GivenPoses
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the parameters beforehand: half of (x - mean)' `information` (x - mean), x numbers of a lens."""
+
+    camera: int
+    mean: Array
+    information: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A session as a likelihood.
+
+    `readings` (n, m) are those of all the session's views, `regressors` (n, m, k) say how much of each correction is
+    added to them, `reading_std` (m,) how noisy they are. `free` (p,) are the parameters that may move. `bulges`
+    (t, w) are the shapes of the target's warp at its points.
+    """
+
+    layout: Layout
+    groups: tuple[Group, ...]
+    readings: Array
+    regressors: Array
+    reading_std: Array
+    free: NDArray[np.bool_]
+    priors: tuple[Prior, ...]
+    disk_diameter: float | None
+    bulges: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A state, and how far each view's true readings are from what was read (n, m)."""
+
+    state: State
+    reading_errors: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """The weight of each measurement of a group: points (n, q) or poses (n,), 0 for what is set aside."""
+
+    groups: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class GroupTerms:
+    """A group's blocks by the local vector, its views' chain terms, and which readings these were."""
+
+    chain: ChainTerms
+    blocks: Blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The likelihood at an estimate: `cost` is minus twice its logarithm, up to a constant."""
+
+    terms: tuple[GroupTerms, ...]
+    cost: float
+
+
+def all_in(problem: Problem) -> Weights:
+    """Return weights with which everything counts."""
+    return Weights(
+        tuple(
+            group.data.present if isinstance(group.data, PointViews) else np.ones(len(group.data.views))
+            for group in problem.groups
+        )
+    )
+
+
+def offsets_at(problem: Problem, estimate: Estimate) -> tuple[Array | None, ...]:
+    """Return for each group what its centroids of disks are off by, at this estimate."""
+    offsets: list[Array | None] = []
+    for group in problem.groups:
+        if not isinstance(group.data, PointViews):
+            offsets.append(None)
+            continue
+        terms = _chain_terms(problem, group, estimate)
+        offsets.append(disk_offsets(group.data, terms.poses, lens_of(group, estimate.state), problem.disk_diameter))
+    return tuple(offsets)
+
+
+def lens_of(group: Group, state: State) -> Intrinsics:
+    """Return the group's lens at `state`."""
+    values = state.lenses[group.camera]
+    assert group.lens is not None
+    assert values is not None
+    return lens_from_vector(values, group.lens)
+
+
+def evaluate(
+    problem: Problem, estimate: Estimate, weights: Weights, offsets: tuple[Array | None, ...]
+) -> Evaluation:
+    """Return the likelihood and its terms at `estimate`."""
+    state = estimate.state
+    terms, cost = [], 0.0
+    for group, weight, offset in zip(problem.groups, weights.groups, offsets, strict=True):
+        chain = _chain_terms(problem, group, estimate)
+        if isinstance(group.data, PointViews):
+            lens = state.lenses[group.camera]
+            assert group.lens is not None
+            assert lens is not None
+            assert offset is not None
+            bulges = problem.bulges[group.data.ids]
+            blocks = point_blocks(
+                group.data, chain.poses, lens, group.lens.model, offset, weight, bulges @ state.warp, bulges
+            )
+        else:
+            blocks = pose_blocks(group.data, chain.poses, weight)
+        terms.append(GroupTerms(chain, blocks))
+        cost += float(blocks.cost.sum())
+    noisy = problem.reading_std > 0
+    cost += float(((estimate.reading_errors[:, noisy] / problem.reading_std[noisy]) ** 2).sum())
+    for prior in problem.priors:
+        away = state.lenses[prior.camera] - prior.mean
+        cost += float(away @ prior.information @ away)
+    return Evaluation(tuple(terms), cost if np.isfinite(cost) else np.inf)
+
+
+def _chain_terms(problem: Problem, group: Group, estimate: Estimate) -> ChainTerms:
+    views = group.data.views
+    readings = problem.readings[views] + estimate.reading_errors[views]
+    return chain_terms(
+        estimate.state, problem.layout, group.camera, group.link, readings, problem.regressors[views]
+    )

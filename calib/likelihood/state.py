@@ -1,0 +1,163 @@
+"""What the fit moves: the chain, the cameras on it and their lenses, as a point and as a vector of small steps.
+
+Steps are minimal: a revolute axis turns about two normals through its point and shifts along them (4), a prismatic
+one turns (2), a scale changes by its logarithm (1), a camera moves in its own frame (6). Every parameter is
+thus a twist of the chain somewhere, or a number of the lens.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from calib.chain import Chain
+from calib.likelihood.lens_terms import LENS_NAMES
+from calib.transforms import any_normal, transform
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens as a vector, None for none.
+
+    `corrections` (k,) are coefficients of what is added to readings, `warp` (w,) of what is added to the target.
+    """
+
+    chain: Chain
+    mounts: Array
+    lenses: tuple[Array | None, ...]
+    corrections: Array
+    warp: Array
+
+    def moved(self, step: Array, layout: "Layout") -> "State":
+        """Return the state after a step (p,) of the layout's parameters."""
+        chain, mounts = self.chain, self.mounts.copy()
+        axes, points, scales = chain.axes.copy(), chain.points.copy(), chain.scales.copy()
+        for joint in range(len(chain)):
+            motion = exp_twist(joint_basis(chain, joint) @ step[layout.shapes[joint]])
+            axes[joint] = motion[:3, :3] @ axes[joint]
+            points[joint] = motion[:3, :3] @ points[joint] + motion[:3, 3]
+            scales[joint] *= np.exp(step[layout.scales[joint]])
+        for camera in range(len(mounts)):
+            mounts[camera] = mounts[camera] @ exp_twist(step[layout.mounts[camera]])
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        return State(
+            chain=replace(chain, axes=axes, points=points, scales=scales),
+            mounts=mounts,
+            lenses=tuple(
+                None if lens is None else lens + step[part]
+                for lens, part in zip(self.lenses, layout.lenses, strict=True)
+            ),
+            corrections=self.corrections + step[layout.corrections],
+            warp=self.warp + step[layout.warp],
+        )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each part of the state lies in the vector of steps, and what each entry is called."""
+
+    names: tuple[str, ...]
+    shapes: tuple[slice, ...]
+    scales: tuple[int, ...]
+    mounts: tuple[slice, ...]
+    lenses: tuple[slice, ...]
+    corrections: slice
+    warp: slice
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @classmethod
+    def of(
+        cls,
+        state: State,
+        joints: Sequence[str],
+        cameras: Sequence[str],
+        models: Sequence[str | None],
+        corrections: Sequence[str] = (),
+        warp: Sequence[str] = (),
+    ) -> "Layout":
+        """Return the layout of `state`, whose parts are called as given."""
+        names: list[str] = []
+
+        def take(owner: str, *entries: str) -> slice:
+            names.extend(f"{owner}.{entry}" for entry in entries)
+            return slice(len(names) - len(entries), len(names))
+
+        shapes, scales = [], []
+        for joint, revolute in zip(joints, state.chain.revolute, strict=True):
+            entries = ["axis[0]", "axis[1]", "point[0]", "point[1]"] if revolute else ["axis[0]", "axis[1]"]
+            shapes.append(take(joint, *entries))
+            scales.append(take(joint, "scale").start)
+        mounts = [take(camera, *(f"mount[{i}]" for i in range(6))) for camera in cameras]
+        lenses = [
+            take(camera, *(() if model is None else LENS_NAMES[model]))
+            for camera, model in zip(cameras, models, strict=True)
+        ]
+        return cls(
+            shapes=tuple(shapes),
+            scales=tuple(scales),
+            mounts=tuple(mounts),
+            lenses=tuple(lenses),
+            corrections=take("correction", *corrections),
+            warp=take("warp", *warp),
+            names=tuple(names),
+        )
+
+
+def joint_basis(chain: Chain, joint: int) -> Array:
+    """Return the twists (6, 4 or 2) in the world that move a joint's axis without sliding it along itself."""
+    axis, point = chain.axes[joint], chain.points[joint]
+    first = any_normal(axis)
+    normals = [first, np.cross(axis, first)]
+    turns = [np.concatenate([normal, np.cross(point, normal)]) for normal in normals]
+    if not chain.revolute[joint]:
+        return np.column_stack([np.concatenate([normal, np.zeros(3)]) for normal in normals])
+    shifts = [np.concatenate([np.zeros(3), normal]) for normal in normals]
+    return np.column_stack(turns + shifts)
+
+
+def joint_screw(chain: Chain, joint: int) -> Array:
+    """Return the joint's unit screw (6,), rotation first, in the world at readings 0."""
+    axis, point = chain.axes[joint], chain.points[joint]
+    if chain.revolute[joint]:
+        return np.concatenate([axis, np.cross(point, axis)])
+    return np.concatenate([np.zeros(3), axis])
+
+
+def exp_twist(twist: Array) -> Array:
+    """Return the motion (4, 4) of a twist (6,), rotation first."""
+    turn, shift = twist[:3], twist[3:]
+    angle = float(np.linalg.norm(turn))
+    rotation = Rotation.from_rotvec(turn).as_matrix()
+    if angle < 1e-12:
+        return transform(rotation, shift)
+    cross = skew(turn / angle)
+    left = (
+        np.eye(3)
+        + (2 * np.sin(angle / 2) ** 2 / angle) * cross
+        + (1 - np.sin(angle) / angle) * (cross @ cross)
+    )
+    return transform(rotation, left @ shift)
+
+
+def adjoint(motions: Array) -> Array:
+    """Return the matrices (..., 6, 6) that carry twists through `motions` (..., 4, 4)."""
+    rotation, translation = motions[..., :3, :3], motions[..., :3, 3]
+    result = np.zeros((*motions.shape[:-2], 6, 6))
+    result[..., :3, :3] = result[..., 3:, 3:] = rotation
+    result[..., 3:, :3] = skew(translation) @ rotation
+    return result
+
+
+def skew(vectors: Array) -> Array:
+    """Return the cross product matrices (..., 3, 3) of `vectors` (..., 3)."""
+    result = np.zeros((*vectors.shape, 3))
+    result[..., 0, 1], result[..., 0, 2] = -vectors[..., 2], vectors[..., 1]
+    result[..., 1, 0], result[..., 1, 2] = vectors[..., 2], -vectors[..., 0]
+    result[..., 2, 0], result[..., 2, 1] = -vectors[..., 1], vectors[..., 0]
+    return result
