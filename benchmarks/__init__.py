@@ -1,0 +1,13 @@
+"""What we claim about speed and accuracy, measured: `python -m benchmarks --list`.
+
+Machines differ and are noisy, so that nothing here is a limit. Every figure stands beside that of a peer, of
+an empty endpoint or of the paper from the same run, and what is timed is timed in turns (A B A B ...).
+
+    command        which benchmarks run;  timing, printing   turns, medians and tables, for all of them
+    paper_rig      the paper's simulated table, and a session of points as it would measure them
+    solve_time, detection_time, paper_table
+    pose_rate      with its server (pose_server) and its client (http_client)
+
+A benchmark is a module with a docstring that says what it measures, and `run(quick)`, which prints its tables
+and returns its main figures by name.
+"""
