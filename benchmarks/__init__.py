@@ -5,8 +5,9 @@ an empty endpoint or of the paper from the same run, and what is timed is timed 
 
     command        which benchmarks run;  timing, printing   turns, medians and tables, for all of them
     paper_rig      the paper's simulated table, and a session of points as it would measure them
-    solve_time, detection_time, paper_table
-    pose_rate      with its server (pose_server) and its client (http_client)
+    solve_time, detection_time
+    pose_rate      with its servers (pose_server, bare_server; server_process) and its client (http_client)
+    paper_table    with its runs (paper_run), and the rows of both sides (paper_rows)
 
 A benchmark is a module with a docstring that says what it measures, and `run(quick)`, which prints its tables
 and returns its main figures by name.

@@ -1,13 +1,12 @@
 """The server of `pose_rate`, in a process of its own: the daemon as `serve` runs it, and one route more.
 
-`python -m benchmarks.pose_server FOLDER` serves the paper's simulated table at the pace of life, with a
-calibration solved from points, and prints its address. The route answers with a constant that it is given.
+`python -m benchmarks.pose_server FOLDER` serves the paper's simulated table, with a calibration
+solved from points, and prints its address. The route answers with a constant that it is given.
 """
 
 import asyncio
 import json
 import sys
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,14 +24,9 @@ CONSTANT = "/api/v1/pose/constant"
 
 def main(folder: Path) -> None:
     """Serve until SIGTERM."""
-    profile = paper_profile()
-    assert profile.simulation is not None
-    at_lifes_pace = profile.simulation.model_copy(update={"time_scale": 1.0})
     asyncio.run(_store_calibration(folder))
     _add_constant_route()
-    serve(
-        replace(profile, simulation=at_lifes_pace), folder, port=0, on_ready=lambda at: print(at, flush=True)
-    )
+    serve(paper_profile(), folder, port=0, on_ready=lambda address: print(address, flush=True))
 
 
 async def _store_calibration(folder: Path) -> None:
