@@ -70,7 +70,8 @@ def bind(host: str, port: int) -> socket.socket:
     """Return a socket bound to `host` and `port`; raises ServeError with what to do."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        listening = socket.socket(family, socket.SOCK_STREAM)
+        # asyncio sends small answers at once (TCP_NODELAY) only on sockets that say that they are TCP.
+        listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     except OSError as error:
         raise ServeError(f"cannot listen on {host}: {error.strerror}: choose another --host") from None
     try:

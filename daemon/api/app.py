@@ -3,7 +3,7 @@
 from importlib.metadata import version
 from typing import Any, Final
 
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from daemon.api import axes, calibrations, camera, lease, metrics, pose_stream, poses, problems, rig, runs
@@ -48,10 +48,9 @@ def create_app(service: Service) -> FastAPI:
         generate_unique_id_function=_operation_id,
     )
     app.state.service = service
-    api = APIRouter(prefix=PREFIX)
-    for part in (rig, lease, axes, camera, runs, calibrations, poses, pose_stream):
-        api.include_router(part.router)
-    app.include_router(api)
+    # Routes are tried in this order, so that the pose, which is asked most, comes first.
+    for part in (poses, pose_stream, rig, lease, axes, camera, runs, calibrations):
+        app.include_router(part.router, prefix=PREFIX)
     app.include_router(metrics.router)
     problems.install(app)
     _describe_problems(app)
