@@ -16,7 +16,7 @@ from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError
 from daemon.lease import LeaseDesk
 from daemon.live_picture import LivePicture
-from daemon.pose import PoseService
+from daemon.pose import ActiveCalibration, PoseService
 from daemon.procedure import RunManager
 from daemon.profile import Profile
 from daemon.rig import Devices, Rig
@@ -48,9 +48,10 @@ class Service:
         Raises UnknownCalibrationError, CalibrationMismatchError, FormatError and StoreError; the one that was
         active stays so then.
         """
-        record = await self.store.calibration(calibration_id)
-        self.poses.activate(record.id, _document(record))
-        return await self.store.activate(calibration_id)
+        prepared = self._prepare(await self.store.calibration(calibration_id))
+        record = await self.store.activate(calibration_id)
+        self.poses.activate(prepared)
+        return record
 
     async def restore(self) -> None:
         """Take up what an earlier daemon left: the active calibration, and runs that it did not finish."""
@@ -60,7 +61,7 @@ class Service:
         if record is None:
             return
         try:
-            self.poses.activate(record.id, _document(record))
+            self.poses.activate(self._prepare(record))
         except (CalibError, DaemonError) as error:
             # A rig without a pose can still be calibrated; GET /pose says that nothing is.
             logger.warning("the active calibration cannot be used: %s", error)
@@ -75,7 +76,14 @@ class Service:
         self.leases.close()
 
     def _use(self, record: CalibrationRecord, calibration: Calibration) -> None:
-        self.poses.activate(record.id, calibration)
+        self.poses.activate(self.poses.prepare(record.id, calibration))
+
+    def _prepare(self, record: CalibrationRecord) -> ActiveCalibration:
+        try:
+            calibration = Calibration.model_validate_json(record.document)
+        except ValidationError as error:
+            raise FormatError(f"calibration '{record.id}': {first_problem(error)}") from error
+        return self.poses.prepare(record.id, calibration)
 
 
 @contextlib.asynccontextmanager
@@ -97,10 +105,3 @@ async def running_service(
         stack.push_async_callback(service.halt)
         await service.restore()
         yield service
-
-
-def _document(record: CalibrationRecord) -> Calibration:
-    try:
-        return Calibration.model_validate_json(record.document)
-    except ValidationError as error:
-        raise FormatError(f"calibration '{record.id}': {first_problem(error)}") from error

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 from fastapi import APIRouter, Path
 from pydantic import BaseModel, Field
 
+from calib.errors import FormatError
 from daemon.api.dependencies import ServiceDep
 from daemon.api.problems import answers
 from daemon.errors import (
@@ -82,7 +83,7 @@ async def get_calibration(calibration_id: CalibrationId, service: ServiceDep) ->
 @router.post(
     "/{calibration_id}/activate",
     summary="Compute poses from this calibration",
-    responses=answers(UnknownCalibrationError, CalibrationMismatchError, StoreError),
+    responses=answers(UnknownCalibrationError, CalibrationMismatchError, FormatError, StoreError),
 )
 async def activate_calibration(calibration_id: CalibrationId, service: ServiceDep) -> CalibrationEntry:
     """Make this calibration the active one, now and after every restart."""

@@ -77,7 +77,9 @@ async def list_runs(service: ServiceDep) -> list[RunDocument]:
     "",
     status_code=202,
     summary="Start the profile's procedure",
-    responses=answers(RunActiveError, StopLatchedError, RigFaultError, LeaseHeldError, StoreError),
+    responses=answers(
+        RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError, StoreError
+    ),
 )
 async def start_run(
     http: Request,

@@ -43,11 +43,15 @@ class PoseService:
             )
         return self._active
 
-    def activate(self, calibration_id: str, calibration: Calibration) -> None:
-        """Answer from this calibration from now on; raises CalibrationMismatchError for another rig's."""
-        self._active = ActiveCalibration.of(calibration_id, calibration, list(self._rig.specs))
+    def prepare(self, calibration_id: str, calibration: Calibration) -> ActiveCalibration:
+        """Return what `activate` takes; raises CalibrationMismatchError for another rig's calibration."""
+        return ActiveCalibration.of(calibration_id, calibration, list(self._rig.specs))
+
+    def activate(self, prepared: ActiveCalibration) -> None:
+        """Answer from this calibration from now on."""
+        self._active = prepared
         self._written.clear()
-        logger.info("poses are computed from calibration '%s'", calibration_id)
+        logger.info("poses are computed from calibration '%s'", prepared.id)
 
     def now(self, camera: str | None = None) -> bytes:
         """Return the pose at the latest readings, as the JSON of the API's `Pose`.

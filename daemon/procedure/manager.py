@@ -31,6 +31,7 @@ class RunManager:
         self._activate = activate
         self._latest: Run | None = None
         self._starting = asyncio.Lock()
+        self._closed = False
 
     @property
     def active(self) -> Run | None:
@@ -41,7 +42,8 @@ class RunManager:
     async def start(self, owner: str = "", note: str = "", token: str | None = None) -> RunRecord:
         """Start the profile's whole procedure; `token` shows the starter's lease, if there is one.
 
-        Raises RunActiveError, StopLatchedError, RigFaultError, LeaseHeldError and StoreError before it moves.
+        Before anything moves, raises RunActiveError, RunStateError, StopLatchedError, RigFaultError,
+        LeaseHeldError and StoreError.
         """
         async with self._starting:
             self._require_able()
@@ -102,7 +104,8 @@ class RunManager:
                 yield event
 
     async def close(self) -> None:
-        """Interrupt the run under way, if any, and return when its axes stand."""
+        """Start no more runs, interrupt the one under way, if any, and return when its axes stand."""
+        self._closed = True
         if self.active is not None:
             await self.active.end(
                 RunState.INTERRUPTED,
@@ -110,6 +113,8 @@ class RunManager:
             )
 
     def _require_able(self) -> None:
+        if self._closed:
+            raise RunStateError("no run can be started any more: the daemon is shutting down")
         if self.active is not None:
             raise RunActiveError(f"run '{self.active.record.id}' is under way: wait for it, or cancel it")
         self._rig.latch.require_free()

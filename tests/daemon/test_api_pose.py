@@ -1,6 +1,8 @@
 """The pose over HTTP: right during and after a run, refused in words where it cannot be known."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, cast
 
 import httpx
@@ -9,10 +11,10 @@ import pytest
 from numpy.typing import ArrayLike
 
 from calib import Calibration
-from daemon.errors import CalibrationMismatchError
+from daemon.profile import Profile
 from daemon.rig import Devices
-from daemon.service import Service
-from daemon.store import RunState
+from daemon.service import Service, running_service
+from daemon.store import CalibrationRecord, RunState
 from drivers.simulated import SimulatedController
 from tests.daemon.motions import home_all, until
 
@@ -135,7 +137,8 @@ async def test_points_and_pixels_lead_to_each_other(calibrated: Service, client:
 async def test_a_lens_that_is_not_known_is_said_so(calibrated: Service, client: httpx.AsyncClient) -> None:
     document = calibrated.poses.active.calibration.model_dump(mode="json")
     document["cameras"][0]["intrinsics"] = None
-    calibrated.poses.activate("without a lens", Calibration.model_validate(document))
+    without = calibrated.poses.prepare("without a lens", Calibration.model_validate(document))
+    calibrated.poses.activate(without)
     answer = await client.post("/project", json={"points": [[0, 0, 0]]})
     assert (answer.status_code, answer.json()["code"]) == (409, "lens_unknown")
 
@@ -184,7 +187,7 @@ async def test_a_mute_device_never_gives_an_old_pose(
     assert "2.5 s old, and the profile allows 2 s" in answer.json()["detail"]
 
 
-async def test_another_rigs_calibration_is_refused_and_the_old_one_stays(
+async def test_a_calibration_that_does_not_fit_is_refused_and_the_active_one_stays(
     calibrated: Service, client: httpx.AsyncClient
 ) -> None:
     first = calibrated.poses.calibration_id
@@ -192,9 +195,40 @@ async def test_another_rigs_calibration_is_refused_and_the_old_one_stays(
     record = await calibrated.store.calibration(first)
     document = json.loads(record.document)
     document["joints"][0]["name"] = document["cameras"][0]["link"] = "tilt"
-    with pytest.raises(CalibrationMismatchError, match="of the joints tilt, pan"):
-        calibrated.poses.activate("other", Calibration.model_validate(document))
+    await keep(calibrated, replace(record, id="another-rigs", document=json.dumps(document)))
+    await keep(calibrated, replace(record, id="cut-off", document=record.document[:100]))
+    await calibrated.store.activate(first)
+    for other, code in (("another-rigs", "calibration_mismatch"), ("cut-off", "calibration_damaged")):
+        answer = await client.post(f"/calibrations/{other}/activate")
+        assert (answer.status_code, answer.json()["code"]) == (409, code)
+        assert other in answer.json()["detail"]
     assert calibrated.poses.calibration_id == first
+    active = await calibrated.store.active_calibration()
+    assert active is not None
+    assert active.id == first
+
+
+async def test_a_damaged_calibration_does_not_keep_the_daemon_from_starting(
+    profile: Profile, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with running_service(profile, tmp_path / "data") as service:
+        await service.runs.wait((await service.runs.start()).id)
+        active = await service.store.active_calibration()
+        assert active is not None
+        await keep(service, replace(active, id="cut-off", document=active.document[:100]))
+    async with running_service(profile, tmp_path / "data") as service:
+        assert service.poses.calibration_id is None
+        assert "calibration 'cut-off'" in caplog.text
+        prepared = await service.activate(active.id)
+        assert service.poses.calibration_id == prepared.id == active.id
+    async with running_service(profile, tmp_path / "data") as service:
+        assert service.poses.calibration_id == active.id
+
+
+async def keep(service: Service, record: CalibrationRecord) -> None:
+    """Store a calibration, active, as a run's."""
+    assert record.run_id is not None
+    await service.store.change_run(record.run_id, RunState.SUCCEEDED, calibration=record)
 
 
 async def test_an_earlier_calibration_can_be_activated(
