@@ -6,6 +6,7 @@ Its parts:
     problems        errors as problem documents;  dependencies  what routes are given
     rig, lease, axes, camera, runs, calibrations, poses, pose_stream, metrics
                     routes by what they are about;  *_documents  their larger answers
+    reference       all of it as a page to read
 """
 
 from daemon.api.app import create_app

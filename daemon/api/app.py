@@ -6,7 +6,19 @@ from typing import Any, Final
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from daemon.api import axes, calibrations, camera, lease, metrics, pose_stream, poses, problems, rig, runs
+from daemon.api import (
+    axes,
+    calibrations,
+    camera,
+    lease,
+    metrics,
+    pose_stream,
+    poses,
+    problems,
+    reference,
+    rig,
+    runs,
+)
 from daemon.service import Service
 
 PREFIX: Final = "/api/v1"
@@ -42,7 +54,7 @@ def create_app(service: Service) -> FastAPI:
         description=DESCRIPTION,
         openapi_url=f"{PREFIX}/openapi.json",
         openapi_tags=TAGS,
-        # The interactive pages load scripts from elsewhere, which a laboratory's network may not have.
+        # FastAPI's own pages load scripts from elsewhere, which a laboratory's network may not have.
         docs_url=None,
         redoc_url=None,
         generate_unique_id_function=_operation_id,
@@ -52,6 +64,7 @@ def create_app(service: Service) -> FastAPI:
     for part in (poses, pose_stream, rig, lease, axes, camera, runs, calibrations):
         app.include_router(part.router, prefix=PREFIX)
     app.include_router(metrics.router)
+    app.include_router(reference.router)
     problems.install(app)
     _describe_problems(app)
     return app

@@ -125,6 +125,17 @@ def test_so_is_every_answer_to_who_may_move(operation: APIOperation, rig: Served
         assert not codes & {401, 403}
 
 
+def test_the_description_can_be_read_without_the_internet(rig: Served) -> None:
+    document = httpx.get(f"{rig.address}/api/v1/openapi.json").json()
+    page = httpx.get(f"{rig.address}/docs").text
+    for path, operations in document["paths"].items():
+        for method in operations:
+            assert f"{method.upper()} {path}" in page
+    assert "<script" not in page
+    assert "//" not in page.replace("</", "")
+    assert httpx.get(f"{rig.address}/docs").headers["content-type"].startswith("text/html")
+
+
 def test_every_operation_is_described(rig: Served) -> None:
     document = httpx.get(f"{rig.address}/api/v1/openapi.json").json()
     tags = {tag["name"] for tag in document["tags"]}
