@@ -1,4 +1,4 @@
-"""The API's description as a page to read: no script, nothing from elsewhere, so that it needs no internet."""
+"""The API's description as a page to read: no script, nothing from elsewhere, no need of the internet."""
 
 from collections.abc import Iterator
 from html import escape
