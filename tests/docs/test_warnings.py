@@ -19,12 +19,8 @@ def _sentences() -> str:
 
 
 def _explained() -> list[str]:
-    text = page(PAGE).partition("\n## Warnings\n")[2]
-    first = table_below(
-        text,
-        "They are in the calibration's `quality.warnings`, on stderr, and in the run's "
-        "events. `…` stands for what differs.",
-    )
+    text = page(PAGE)
+    first = table_below(text, "## Warnings")
     second = table_below(text, "And what ends a run or a `solve`:")
     return [row[0] for row in (*first, *second)]
 

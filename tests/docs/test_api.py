@@ -1,0 +1,150 @@
+"""docs/reference/api.md has every route, problem, event and answer of the API, and its examples work."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import jsonschema
+import pytest
+from fastapi import WebSocket
+from pydantic import BaseModel
+
+from daemon.api import create_app, pose_stream, problems
+from daemon.procedure import RunEvent
+from daemon.service import Service
+from tests.daemon.rigs import write_profile
+from tests.docs.pages import blocks, page, table_below, unquoted
+
+PAGE = "reference/api.md"
+PREFIX = "/api/v1"
+OPENAPI = create_app(cast("Service", None)).openapi()
+SECTIONS = ("Rig", "Lease", "Motion", "Camera", "Runs", "Calibrations", "Pose")
+
+
+def _rows() -> dict[str, list[str]]:
+    rows = [row for section in SECTIONS for row in table_below(page(PAGE), f"## {section}")]
+    assert len({row[0] for row in rows}) == len(rows)
+    return {unquoted(row[0]): row for row in rows}
+
+
+def _operations() -> dict[str, dict[str, Any]]:
+    return {
+        f"{method.upper()} {path.removeprefix(PREFIX)}": operation
+        for path, operations in OPENAPI["paths"].items()
+        for method, operation in operations.items()
+    }
+
+
+def _codes(cell: str) -> set[str]:
+    for name in re.findall(r"\*(\w+)\*", cell):
+        cell += page(PAGE).partition(f"\n*{name}*:")[2].partition("\n\n")[0]
+    return set(re.findall(r"`(\w+)`", cell))
+
+
+def test_every_route_is_on_the_page_and_the_other_way_round() -> None:
+    assert pose_stream.router.routes[0].endpoint.__annotations__["socket"] is WebSocket  # type: ignore[attr-defined]
+    assert sorted(_rows()) == sorted([*_operations(), "WS /pose/stream"])
+
+
+@pytest.mark.parametrize("route", _operations())
+def test_a_route_is_described_as_it_is(route: str) -> None:
+    operation, row = _operations()[route], _rows()[route]
+    described = " ".join(answer["description"] for answer in operation["responses"].values())
+    documented = set(re.findall(r"`([a-z]+_[a-z_]+)`", described)) - {"invalid_request"}
+    assert _codes(row[4]) == documented
+    parameters = operation.get("parameters", [])
+    if route.startswith(("GET", "WS")):
+        for parameter in parameters:
+            if parameter["in"] != "path":
+                assert parameter["name"] in row[2].lower()
+    asks_for_lease = "lease_required" in documented
+    assert (row[1] == "yes") == asks_for_lease
+    if (row[1] == "no") or asks_for_lease:
+        shows = any(parameter["name"] == "X-Lease" for parameter in parameters)
+        assert shows == asks_for_lease
+    body = operation.get("requestBody", {}).get("content", {}).get("application/json", {}).get("schema", {})
+    for key in _properties(body):
+        assert f"`{key}`" in row[2]
+
+
+def _properties(schema: dict[str, Any]) -> set[str]:
+    for inner in schema.get("anyOf", []):
+        if found := _properties(inner):
+            return found
+    name = schema.get("$ref", "").rpartition("/")[2]
+    return set(OPENAPI["components"]["schemas"][name]["properties"]) if name else set()
+
+
+def test_every_problem_is_on_the_page_with_its_status() -> None:
+    kinds = [
+        *problems.PROBLEMS.values(),
+        *problems.HTTP_PROBLEMS.values(),
+        problems.INVALID,
+        problems.INTERNAL,
+    ]
+    text = page(PAGE).partition("\n## Problems\n")[2]
+    rows = re.findall(r"^\| `(\w+)` \| (\d+) \|", text, re.MULTILINE)
+    assert sorted((code, int(status)) for code, status in rows) == sorted(
+        {(kind.code, kind.status) for kind in kinds}
+    )
+
+
+def test_every_event_is_on_the_page_with_its_fields() -> None:
+    events: tuple[type[BaseModel], ...] = get_args(get_args(RunEvent)[0])
+    described = {
+        unquoted(row[0]): set(re.findall(r"`(\w+)`", row[1])) for row in table_below(page(PAGE), "### Events")
+    }
+    common = {"run_id", "sequence", "time", "type"}
+    assert described == {
+        event.model_fields["type"].default: set(event.model_fields) - common for event in events
+    }
+
+
+ANSWERS = re.findall(r"<!-- answer: (\w+) -->\n```json\n(.*?)```", page(PAGE), re.DOTALL)
+
+
+@pytest.mark.parametrize(("model", "text"), ANSWERS, ids=[model for model, _ in ANSWERS])
+def test_an_answer_on_the_page_has_the_form_that_it_has(model: str, text: str) -> None:
+    schemas = OPENAPI["components"]["schemas"]
+    answer = json.loads(text)
+    jsonschema.validate(answer, {"$ref": f"#/components/schemas/{model}", "components": {"schemas": schemas}})
+    assert set(answer) == set(schemas[model]["properties"])
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[str]:
+    """The address of a daemon of its own, on a small rig whose axes are called as those on the page."""
+    command = [sys.executable, "-c", "from daemon.cli import main; main()", "serve", "--port", "0"]
+    command += ["--profile", str(write_profile(tmp_path)), "--data", str(tmp_path / "data")]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as process:
+        assert process.stdout is not None
+        try:
+            found = re.search(r"http://[\w.:]+", process.stdout.readline())
+            assert found is not None
+            yield found[0]
+        finally:
+            process.terminate()
+            process.communicate()
+    assert process.returncode == 0
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
+def test_the_examples_work_one_after_the_other(served: str, tmp_path: Path) -> None:
+    script = 'set -e\ncurl() { command curl --fail-with-body "$@"; echo; }\n'
+    script += "\n".join(block.text for block in blocks(PAGE, "sh"))
+    script = script.replace("http://localhost:8080", served)
+    ran = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout[-2000:] + ran.stderr[-500:]
+    assert '"state":"succeeded"' in ran.stdout
+    assert (tmp_path / "live.jpg").read_bytes().startswith(b"\xff\xd8")
+    program = blocks(PAGE, "python")[0].text.replace("ws://localhost:8080", served.replace("http", "ws"))
+    streamed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert streamed.returncode == 0, streamed.stderr
+    assert len(streamed.stdout.splitlines()) == 3
