@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -63,7 +62,7 @@ class PoseService:
         age = self._require_fresh(snapshot)
         written = self._written.get(camera)
         if written is None or written[0] is not snapshot:
-            written = snapshot, to_json(self._answer(active, snapshot, age, camera))[:-1]
+            written = snapshot, to_json(self._answer(active, snapshot, camera))[:-1]
             self._written[camera] = written
         return b'%s,"age_s":%.6f}' % (written[1], age)
 
@@ -89,12 +88,14 @@ class PoseService:
         )
 
     def _answer(
-        self, active: ActiveCalibration, snapshot: RigSnapshot, age: float, camera: str | None
+        self, active: ActiveCalibration, snapshot: RigSnapshot, camera: str | None
     ) -> Mapping[str, Any]:
         poses = active.poses(np.array([snapshot.readings], dtype=float), camera)
-        read_at = datetime.now(UTC) - timedelta(seconds=age)
+        assert snapshot.timestamp is not None
         return {
-            "timestamp": read_at.isoformat(timespec="microseconds").replace("+00:00", "Z"),
+            "timestamp": self._rig.utc.at(snapshot.timestamp)
+            .isoformat(timespec="microseconds")
+            .replace("+00:00", "Z"),
             **_pose_fields(poses, 0),
             "moving": snapshot.moving,
             "calibration_id": active.id,

@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from calib.detection import detect
@@ -73,7 +73,6 @@ class Observer:
         settled = await self._standing()
         assert stood_at is not None
         frame = await self._rig.frame(after=clock.now())
-        taken_at = datetime.now(UTC)
         self._require_unmoved(settled, await self._standing())
         detection = await asyncio.to_thread(detect, frame.image, self._rig.profile.target)
         if len(detection.ids) == 0:
@@ -83,7 +82,7 @@ class Observer:
             readings=[position for position in settled.readings if position is not None],
             approached=self._approach.sides,
             points=len(detection.ids),
-            taken_at=taken_at,
+            taken_at=self._rig.utc.at(frame.timestamp),
             settled=frame.timestamp - stood_at,
         )
 

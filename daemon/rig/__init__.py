@@ -1,10 +1,12 @@
 """The rig: devices and their owners, the snapshot that everybody reads, and the stop that nothing holds up.
 
-devices           profile -> drivers, clock, simulated world
-device_owner      connecting, losing and finding a device;  controller_owner, camera_owner  the two kinds
-snapshot          what is known at one instant
-stop_latch        nothing moves after a stop before it is acknowledged
-rig               all of it together
+In the order in which a state travels:
+
+    devices           profile -> drivers, clock, simulated world
+    device_owner      connecting, losing and finding a device;  controller_owner, camera_owner  the two kinds
+    snapshot          what is known at one instant;  utc  its time stamps in UTC
+    stop_latch        nothing moves after a stop before it is acknowledged
+    rig               all of it together
 """
 
 from daemon.rig.devices import Devices, make_devices

@@ -12,6 +12,7 @@ from daemon.rig.controller_owner import Action, ControllerOwner
 from daemon.rig.devices import Devices, make_devices
 from daemon.rig.snapshot import AxisSnapshot, RigSnapshot
 from daemon.rig.stop_latch import StopLatch
+from daemon.rig.utc import UtcClock
 from drivers.axis import AxisController, AxisSpec
 from drivers.camera import Frame
 from drivers.cancellation import finish
@@ -22,8 +23,8 @@ class Rig:
     """The devices of one profile, each with its owner task, from `open` to `close`.
 
     Positions, targets and distances are in each axis's reading unit. `snapshot` is the latest state of all
-    axes; `changed` fires whenever it is replaced. A motion returns when the axes stand at its end; cancelling
-    it stops the axes first. No method resends a motion.
+    axes; `changed` fires whenever it is replaced; `utc` turns its time stamps into UTC. A motion returns when
+    the axes stand at its end; cancelling it stops the axes first. No method resends a motion.
     """
 
     def __init__(self, profile: Profile, devices: Devices) -> None:
@@ -34,6 +35,7 @@ class Rig:
         self.latch = StopLatch()
         self.changed = Broadcast()
         self._pace = 1.0 if profile.simulation is None else profile.simulation.time_scale
+        self.utc = UtcClock(self.clock, self._pace)
         self._controllers = [
             ControllerOwner(
                 name,

@@ -1,8 +1,10 @@
 """What outlives the daemon: runs and calibrations in SQLite, session folders beside them.
 
-tables     what is kept;  records  what is given out
-database   the file, its durability, its version, its thread
-store      questions and changes, one transaction each
+In the order in which a record comes out:
+
+    tables     what is kept;  records  what is given out
+    database   the file, its durability, its version, its thread
+    store      questions and changes, one transaction each
 """
 
 from daemon.store.records import CalibrationRecord, CalibrationSummary, RunRecord, RunState
