@@ -24,9 +24,10 @@ from calib.targets import target_points
 NOISE_PX = 0.1
 POINTS = 42
 STEPS = {
-    "_camera_views": "lens calibration, and the pose of each view",
-    "_solve_chain": "closed form, with the target's other ways round",
-    "_quality": "quality: residual of each view",
+    "camera_views": "lens calibration, and the pose of each view",
+    "first_solution": "closed form, with the target's other ways round",
+    "most_likely": "maximum likelihood, with its covariance",
+    "judged": "quality: residual of each view",
 }
 """The steps of `solve`, by the names of their functions in `calib.solver`."""
 

@@ -17,6 +17,7 @@ from calib.chain import Chain
 from calib.dh import link_transform
 from calib.documents import read_json, validate, write_json
 from calib.errors import CalibError
+from calib.pose_covariance import TwistCovariance, pose_covariances, twist_covariance
 from calib.session import (
     Document,
     Intrinsics,
@@ -71,6 +72,13 @@ class Covariance(Document):
 
     parameters: list[str]
     matrix: list[list[Number]]
+
+    @model_validator(mode="after")
+    def _square(self) -> Self:
+        count = len(self.parameters)
+        if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
+            raise ValueError(f"matrix: must have {count} rows and columns, one for each parameter")
+        return self
 
 
 class ViewQuality(Document):
@@ -155,6 +163,19 @@ class Calibration(Document):
             )
         return self.chain.poses(readings, self._links[index], mount)
 
+    def pose_covariance(self, readings: ArrayLike, camera: str | None = None) -> NDArray[np.float64] | None:
+        """Return the poses' covariances (n, 6, 6) at `readings` (n, m), or (6, 6) for one vector; None if unknown.
+
+        Rotation (rad) then position (m), in the camera's frame. Raises as `world_from_camera` does.
+        """
+        index = self.camera_index(camera)
+        known, mount, link = self._twist_covariances[index], self._mounts[index], self._links[index]
+        if known is None or mount is None:
+            return None
+        values = self.chain.checked(readings)
+        covariances = pose_covariances(self.chain, mount, link, known, np.atleast_2d(values))
+        return covariances if values.ndim == 2 else np.asarray(covariances[0])
+
     def base_from_world(self) -> NDArray[np.float64]:
         """Return the base frame's inverse (4, 4)."""
         return np.linalg.inv(np.array(self.world_from_base))
@@ -182,6 +203,20 @@ class Calibration(Document):
             if camera.world_from_camera is None
             else np.array(camera.world_from_camera, dtype=float)
             for camera, link in zip(self.cameras, self._links, strict=True)
+        ]
+
+    @cached_property
+    def _twist_covariances(self) -> list[TwistCovariance | None]:
+        """Each camera's chain covariance, None where nothing is known of it."""
+        stated = self.covariance
+        if stated is None:
+            return [None] * len(self.cameras)
+        matrix = np.array(stated.matrix)
+        return [
+            None
+            if mount is None
+            else twist_covariance(self.chain, mount, index, link, stated.parameters, matrix)
+            for index, (mount, link) in enumerate(zip(self._mounts, self._links, strict=True))
         ]
 
     def _mount_on_link(self, camera: CalibratedCamera, link: int) -> NDArray[np.float64] | None:

@@ -74,18 +74,23 @@ class Chain:
 
         (n, 4, 4) for readings (n, m), (4, 4) for one vector (m,). Raises ReadingsError for a wrong length.
         """
-        values = np.asarray(readings, dtype=float)
+        values = self.checked(readings)
         single = values.ndim == 1
         values = np.atleast_2d(values)
-        if values.ndim != 2 or values.shape[1] != len(self) or not np.all(np.isfinite(values)):
-            got = "not all finite numbers" if values.shape[-1] == len(self) else f"{values.shape[-1]} numbers"
-            raise ReadingsError(
-                f"readings must be one finite number for each of the {len(self)} joints, not {got}"
-            )
         result = np.broadcast_to(np.eye(4), (len(values), 4, 4))
         for joint in range(len(self) if joints is None else joints):
             result = result @ self.motion(joint, values[:, joint])
         return result[0] if single else result
+
+    def checked(self, readings: ArrayLike) -> Array:
+        """Return `readings` (n, m) or (m,) as an array; raises ReadingsError unless they are m finite numbers each."""
+        values = np.asarray(readings, dtype=float)
+        if values.ndim not in (1, 2) or values.shape[-1] != len(self) or not np.all(np.isfinite(values)):
+            got = "not all finite numbers" if values.shape[-1] == len(self) else f"{values.shape[-1]} numbers"
+            raise ReadingsError(
+                f"readings must be one finite number for each of the {len(self)} joints, not {got}"
+            )
+        return values
 
     def poses(self, readings: ArrayLike, joints: int, mount: Array) -> Array:
         """Return the poses at `readings` of what stands at `mount` (4, 4) at readings 0."""

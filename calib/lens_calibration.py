@@ -3,22 +3,27 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.bundle import Bundle, adjust
 from calib.disks import centroid_offsets
 from calib.errors import UnsolvableError
+from calib.homography import first_focal_lengths, homographies, planar_poses
+from calib.lens import camera_matrix
+from calib.likelihood.lens_terms import lens_vector
+from calib.likelihood.measurements import point_views
 from calib.observations import Observation
 from calib.pose_from_view import pose_from_view
 from calib.session import Intrinsics
-from calib.transforms import inverse, transform
+from calib.transforms import inverse
 from calib.tsai import tsai
 
 Array = NDArray[np.float64]
 
 FEWEST_POINTS = 6
 DISK_PASSES = 2
+FEW_VIEWS = 3
 POORLY_KNOWN = 0.02
 """Relative standard deviation of the focal length above which a warning is given."""
 
@@ -46,85 +51,79 @@ def calibrate_camera(
     pixels are centroids of disks, they are referred to the disks' centres by the lens and poses found so
     far.
     """
-    world = [points[observation.ids] for observation in observations]
-    pixels = [observation.pixels for observation in observations]
-    result = _calibrate(world, pixels, size, known)
-    for _ in range(DISK_PASSES):
-        if disk_diameter is None or not any(observation.disk for observation in observations):
-            break
-        centres = [
-            observation.pixels - centroid_offsets(where, inverse(pose), disk_diameter, result.lens)
-            if observation.disk
-            else observation.pixels
-            for observation, where, pose in zip(observations, world, result.poses, strict=True)
-        ]
-        result = _calibrate(world, centres, size, known)
-    return result
-
-
-def _calibrate(
-    world: list[Array], pixels: list[Array], size: tuple[int, int], known: Intrinsics | None
-) -> CameraViews:
     if known is not None:
-        poses = [pose_from_view(*seen, known) for seen in zip(world, pixels, strict=True)]
-        return CameraViews(known, np.array(poses), [])
-    if max(len(seen) for seen in pixels) < FEWEST_POINTS:
+        return CameraViews(known, _poses_of_known_lens(points, observations, known, disk_diameter), [])
+    most = max(len(observation.ids) for observation in observations)
+    if most < FEWEST_POINTS:
         raise UnsolvableError(
-            f"no view shows more than {max(len(seen) for seen in pixels)} points of the target: "
+            f"no view shows more than {most} points of the target: "
             f"a lens needs {FEWEST_POINTS} or more, or known intrinsics in the session"
         )
-    if len(world) == 1:
-        centre = [(size[0] - 1) / 2, (size[1] - 1) / 2]
-        single = tsai(world[0], pixels[0], centre)
-        lens = single.intrinsics.model_copy(update={"width": size[0], "height": size[1]})
-        warning = "the lens is known from a single view only: take several, tilted differently"
-        return CameraViews(lens, single.world_from_camera[None], [warning])
-    return _pinhole(world, pixels, size)
+    if len(observations) == 1:
+        return _single(points, observations[0], size, disk_diameter)
+    return _several(points, observations, size, disk_diameter)
 
 
-def _pinhole(world: list[Array], pixels: list[Array], size: tuple[int, int]) -> CameraViews:
+def _poses_of_known_lens(
+    points: Array, observations: Sequence[Observation], lens: Intrinsics, disk_diameter: float | None
+) -> Array:
+    """Return the poses (n, 4, 4) in which a known lens sees each view."""
+    poses = np.array([pose_from_view(points[seen.ids], seen.pixels, lens) for seen in observations])
+    none_free = np.zeros(len(lens_vector(lens)), dtype=bool)
+    return adjust(point_views(observations, points), lens, poses, none_free, disk_diameter).poses
+
+
+def _single(
+    points: Array, seen: Observation, size: tuple[int, int], disk_diameter: float | None
+) -> CameraViews:
+    """Return Tsai's lens from one view; centroids of disks are referred to their centres by what was found before."""
+    world, pixels, centre = points[seen.ids], seen.pixels, [(size[0] - 1) / 2, (size[1] - 1) / 2]
+    found = tsai(world, pixels, centre)
+    for _ in range(DISK_PASSES):
+        if disk_diameter is not None and seen.disk:
+            camera_from_world = inverse(found.world_from_camera)
+            pixels = seen.pixels - centroid_offsets(world, camera_from_world, disk_diameter, found.intrinsics)
+            found = tsai(world, pixels, centre)
+    lens = found.intrinsics.model_copy(update={"width": size[0], "height": size[1]})
+    warning = "the lens is known from a single view only: take several, tilted differently"
+    return CameraViews(lens, found.world_from_camera[None], [warning])
+
+
+def _several(
+    points: Array, observations: Sequence[Observation], size: tuple[int, int], disk_diameter: float | None
+) -> CameraViews:
     """Return OpenCV's model fitted to the views that show enough points, and the poses of all of them."""
-    enough = [len(seen) >= FEWEST_POINTS for seen in pixels]
-    flags = 0 if sum(enough) > 3 else cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K3
-    try:
-        _, matrix, distortion, rotations, translations, deviations, *_ = cv2.calibrateCameraExtended(
-            [where.astype(np.float32) for where, use in zip(world, enough, strict=True) if use],
-            [seen.astype(np.float32) for seen, use in zip(pixels, enough, strict=True) if use],
-            size,
-            np.eye(3),
-            np.zeros(5),
-            flags=flags,
-        )
-    except cv2.error as error:
-        raise UnsolvableError(
-            "the lens could not be calibrated from these views: take some with the target tilted by "
-            "20 degrees or more"
-        ) from error
-    lens = Intrinsics(
+    enough = np.array([len(observation.ids) >= FEWEST_POINTS for observation in observations])
+    fitted = [observation for observation, use in zip(observations, enough, strict=True) if use]
+    seen = point_views(fitted, points)
+    centre = (np.array(size) - 1) / 2
+    planes = homographies(seen.world, seen.pixels, seen.present)
+    fx, fy = first_focal_lengths(planes, centre)
+    first = Intrinsics(
         model="opencv",
         width=size[0],
         height=size[1],
-        fx=float(matrix[0, 0]),
-        fy=float(matrix[1, 1]),
-        cx=float(matrix[0, 2]),
-        cy=float(matrix[1, 2]),
-        distortion=[float(value) for value in distortion.ravel()[:5]],
+        fx=fx,
+        fy=fy,
+        cx=float(centre[0]),
+        cy=float(centre[1]),
+        distortion=[0.0] * 5,
     )
-    fitted = iter(zip(rotations, translations, strict=True))
-    poses = []
-    for where, seen, use in zip(world, pixels, enough, strict=True):
-        if use:
-            rotation, translation = next(fitted)
-            poses.append(inverse(transform(cv2.Rodrigues(rotation)[0], translation.ravel())))
-        else:
-            poses.append(pose_from_view(where, seen, lens))
-    return CameraViews(
-        lens, np.array(poses), _lens_warnings(lens, np.asarray(deviations, dtype=float).ravel())
-    )
+    # Few views cannot tell the principal point, nor the highest power of the distortion.
+    free = np.ones(9, dtype=bool)
+    if len(fitted) <= FEW_VIEWS:
+        free[[2, 3, 8]] = False
+    bundle = adjust(seen, first, planar_poses(planes, camera_matrix(first)), free, disk_diameter)
+    poses = np.zeros((len(observations), 4, 4))
+    poses[enough] = bundle.poses
+    if not enough.all():
+        others = [observation for observation, use in zip(observations, enough, strict=True) if not use]
+        poses[~enough] = _poses_of_known_lens(points, others, bundle.lens, disk_diameter)
+    return CameraViews(bundle.lens, poses, _lens_warnings(bundle))
 
 
-def _lens_warnings(lens: Intrinsics, deviations: Array) -> list[str]:
-    relative = float(deviations[0] / lens.fx)
+def _lens_warnings(bundle: Bundle) -> list[str]:
+    relative = float(np.sqrt(bundle.covariance[0, 0])) / bundle.lens.fx
     if relative <= POORLY_KNOWN:
         return []
     return [

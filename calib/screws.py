@@ -23,6 +23,8 @@ CHI_MEDIAN = {1: 0.6745, 2: 1.1774}
 HALF_A_TURN = 0.98 * np.pi
 UNEVEN = 0.3
 """How far (rad) a turn may be from what the other readings say of it: more than any noise, less than a mistake."""
+MANY = 0.25
+"""Part of the turns that may be uneven before the readings as a whole are in doubt: single views may be knocked."""
 MAX_STRIDES = 48
 """In a sweep of more views than this, pairs are taken at this many distances along it."""
 
@@ -114,8 +116,9 @@ def _turning_rate(poses: Array, readings: Array, sweeps: Ints, name: str, unit: 
             "or the angle between them cannot be decided: take views in between"
         )
     turn = rotation_log(poses[second, :3, :3] @ np.swapaxes(poses[first, :3, :3], -1, -2))
-    rate = np.asarray(step @ turn / (step @ step), dtype=float)
-    if np.linalg.norm(turn - step[:, None] * rate, axis=1).max() > UNEVEN:
+    rate = robust_mean(turn / step[:, None], step**2, 2)
+    uneven = np.linalg.norm(turn - step[:, None] * rate, axis=1) > UNEVEN
+    if uneven.mean() > MANY:
         raise UnsolvableError(
             f"the camera's turns between neighbouring views of joint '{name}' do not grow with its readings: "
             "these must be less than half a turn apart, so take views in between, or look for wrong readings"

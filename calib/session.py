@@ -86,6 +86,8 @@ class Joint(Document):
     name: Annotated[str, Field(min_length=1)]
     kind: JointKind
     reading_unit: str
+    reading_std: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    """How noisy its readings are (standard deviation, in its reading unit); found out where not given."""
     unit_trusted: bool = False
     """Whether the encoder's own unit is to be believed as a measure to verify against."""
 

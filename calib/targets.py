@@ -183,6 +183,11 @@ class TargetSymmetry:
     turned_from_world: NDArray[np.float64]
 
 
+def disk_diameter(target: Target) -> float | None:
+    """Return the diameter (m) of the target's disks, None where it has none."""
+    return target.disk_diameter if isinstance(target, CircleGrid | AsymmetricCircleGrid) else None
+
+
 def target_points(target: Target) -> NDArray[np.float64]:
     """Return the world coordinates (n, 3), in metres, of the target's points by id; none for `NoTarget`."""
     match target:

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -25,6 +24,9 @@ def inverse(matrix: Array) -> Array:
 
 def rotation_log(matrix: Array) -> Array:
     """Return the rotation vectors (n, 3) in rad of rotations (n, 3, 3) or transforms (n, 4, 4)."""
+    # scipy is a third of the daemon's start, and a pose does not need it.
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.from_matrix(matrix[..., :3, :3]).as_rotvec(), dtype=float)
 
 

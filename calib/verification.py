@@ -44,8 +44,8 @@ class ViewVerdict:
     mean_px: float | None
     rms_px: float | None
     max_px: float | None
-    position_m: float
-    rotation_rad: float
+    position_m: float | None
+    rotation_rad: float | None
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,10 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
     judged = [view for view in session.views if view.use == "verify" or not marked]
     session = session.with_views(judged)
     observed = observe(session, progress)
-    residuals = [view_residual(calibration, session, observation) for observation in observed.observations]
+    residuals = [
+        view_residual(calibration, session, observation, measure_pose=True)
+        for observation in observed.observations
+    ]
     errors = np.concatenate([residual.errors for residual in residuals])
     placed = bool(calibration.joints)
     return Verification(
@@ -110,8 +113,8 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
         mean_px=float(errors.mean()) if len(errors) else None,
         rms_px=float(np.sqrt((errors**2).mean())) if len(errors) else None,
         max_px=float(errors.max()) if len(errors) else None,
-        position_m=_spread([residual.position for residual in residuals]) if placed else None,
-        rotation_rad=_spread([residual.rotation for residual in residuals]) if placed else None,
+        position_m=_spread([residual.position for residual in residuals]),
+        rotation_rad=_spread([residual.rotation for residual in residuals]),
         per_view=[_verdict(session, residual) for residual in residuals],
         travel=_travels(calibration, session, residuals) if placed else [],
         warnings=observed.missing,
@@ -149,7 +152,7 @@ def _travels(
     calibration: Calibration, session: Session, residuals: Sequence[ViewResidual]
 ) -> list[JointTravel]:
     """Return method 1 for every sweep of every joint."""
-    measured = np.array([residual.measured for residual in residuals])
+    measured = np.array([_measured(residual) for residual in residuals])
     views = PoseViews.of(session, [residual.view for residual in residuals], measured)
     labels = sweep_labels(views.readings, views.exercised, views.cameras, views.links)
     travels = []
@@ -177,11 +180,16 @@ def _travel(
                 view=end.view,
                 reading=reading,
                 predicted=_moved(joint.kind, start.predicted, end.predicted, expected),
-                measured=_moved(joint.kind, start.measured, end.measured, expected),
+                measured=_moved(joint.kind, _measured(start), _measured(end), expected),
                 encoder=None if trusted is None else trusted * step,
             )
         )
     return JointTravel(joint.name, joint.kind, first, rows)
+
+
+def _measured(residual: ViewResidual) -> Array:
+    assert residual.measured is not None
+    return residual.measured
 
 
 def _moved(kind: JointKind, start: Array, end: Array, expected: float) -> float:
@@ -195,8 +203,9 @@ def _moved(kind: JointKind, start: Array, end: Array, expected: float) -> float:
     return min(candidates, key=lambda candidate: abs(candidate - expected))
 
 
-def _spread(errors: Sequence[float]) -> Spread:
-    return Spread(mean=float(np.mean(errors)), max=float(np.max(errors)))
+def _spread(errors: Sequence[float | None]) -> Spread | None:
+    known = [error for error in errors if error is not None]
+    return Spread(mean=float(np.mean(known)), max=float(np.max(known))) if known else None
 
 
 VERIFICATION: TypeAdapter[Verification] = TypeAdapter(Verification)

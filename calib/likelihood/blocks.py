@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from calib.disks import centroid_offsets
 from calib.likelihood.lens_terms import pixel_terms
 from calib.likelihood.measurements import GivenPoses, PointViews
-from calib.likelihood.state import skew
 from calib.session import Intrinsics
 from calib.transforms import inverse, rotation_log
+from calib.twists import skew
 
 Array = NDArray[np.float64]
 
@@ -98,6 +98,9 @@ def disk_offsets(seen: PointViews, poses: Array, lens: Intrinsics, diameter: flo
 def _blocks(residuals: Array, local: Array, weights: Array) -> Blocks:
     """Return the blocks of residuals (n, q, r) with derivatives (n, q, r, d), `weights` broadcast to (n, q, r)."""
     count, root = len(residuals), np.sqrt(weights)
+    # What is set aside may be anything, even behind the camera.
+    residuals = np.where((weights > 0) | np.isfinite(residuals), residuals, 0.0)
+    local = np.where((weights > 0)[..., None] | np.isfinite(local), local, 0.0)
     flat = (residuals * root).reshape(count, -1, 1)
     jacobian = (local * root[..., None]).reshape(count, flat.shape[1], local.shape[-1])
     transposed = np.swapaxes(jacobian, 1, 2)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.likelihood.state import Layout, State, adjoint, joint_basis, joint_screw
+from calib.likelihood.state import Layout, State, joint_basis
 from calib.transforms import inverse
+from calib.twists import adjoint, joint_screw
 
 Array = NDArray[np.float64]
 

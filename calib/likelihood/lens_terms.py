@@ -64,7 +64,12 @@ def _opencv(x: Array, y: Array, distortion: Array) -> tuple[Pair, Four, Array]:
     u = x * radial + 2 * p1 * xy + p2 * (r2 + 2 * xx)
     v = y * radial + p1 * (r2 + 2 * yy) + 2 * p2 * xy
     cross = slope * xy + 2 * (p1 * x + p2 * y)
-    jacobian = (radial + slope * xx + 2 * p1 * y + 6 * p2 * x, cross, cross, radial + slope * yy + 6 * p1 * y + 2 * p2 * x)
+    jacobian = (
+        radial + slope * xx + 2 * p1 * y + 6 * p2 * x,
+        cross,
+        cross,
+        radial + slope * yy + 6 * p1 * y + 2 * p2 * x,
+    )
     bend = np.empty((*x.shape, 2, 5))
     r4 = r2 * r2
     for column, factor in ((0, r2), (1, r4), (4, r4 * r2)):

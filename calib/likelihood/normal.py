@@ -85,4 +85,4 @@ def _without_reading_errors(
     offset = -np.linalg.solve(own, pull[..., None])[..., 0]
     reduced = hessian - mixed @ gain
     slope = gradient + (mixed @ offset[..., None])[..., 0]
-    return reduced, slope, Elimination(views, offset, -gain @ local)
+    return reduced, slope, Elimination(views, np.asarray(offset, float), -gain @ local)

@@ -5,7 +5,7 @@ it: a view whose readings are wrong is far off. What then remains at a point tel
 against the median of all, so that neither the noise's size nor a few outliers matter.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,15 @@ Array = NDArray[np.float64]
 RARE = 1e-5
 """How rarely a good measurement may be set aside."""
 TUKEY = 4.685
-FREEING_PASSES = 15
+FREEING_PASSES = 10
+EXACT = 0.1
+LEAST_POINT_NOISE = 1e-5
+"""In px, or of what a covariance says: better is not measured, and made-up points may be exact."""
+MEDIAN_OF_TWO = float(chi2.median(2))
+MEDIAN_OF_SIX = float(chi2.median(6))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class SetAside:
     """What was set aside: views by their places in the session, and points as (view, id)."""
 
@@ -33,58 +38,123 @@ class SetAside:
 
 @dataclass(frozen=True, eq=False)
 class Freed:
-    """Views whose pose was freed: `gain` (n,) is the squared distance to the prediction, `left` (n, q) squared misfits."""
+    """Views whose pose was freed: `shift` (n, 6) away from the prediction, known with `information` (n, 6, 6).
 
-    gain: Array
+    `left` (n, q) are the squared misfits of the points that remain.
+    """
+
+    shift: Array
+    information: Array
     left: Array
 
+    def distance(self, by_reading: Array, std: Array) -> Array:
+        """Return the squared distances (n,) of the shifts in terms of what their noise, and the readings', explains."""
+        spread = by_reading * std
+        covariance = np.linalg.inv(self.information) + spread @ np.swapaxes(spread, 1, 2)
+        reach = np.linalg.solve(covariance, self.shift[..., None])[..., 0]
+        return np.asarray((self.shift * reach).sum(axis=1))
 
-def judged(problem: Problem, evaluation: Evaluation) -> tuple[Weights, SetAside]:
-    """Return weights without the outliers, and what these are; `evaluation` is one in which everything counts."""
+
+@dataclass(frozen=True, eq=False)
+class Misfits:
+    """How far each group's views are from the prediction, `distances` (n,) squared, and their points' `left` (n, q).
+
+    Both are in units of what noise makes of them: `noise` for points, `spread` for views, by their medians.
+    """
+
+    distances: tuple[Array, ...]
+    left: tuple[Array, ...]
+    noise: float
+    spread: float
+
+
+def misfits(problem: Problem, evaluation: Evaluation) -> Misfits:
+    """Return the misfits at an evaluation in which everything counts and readings are taken as they were read."""
     present = all_in(problem).groups
     freed = [
         _freed(terms.blocks, weight) if isinstance(group.data, PointViews) else _given(terms.blocks)
         for group, terms, weight in zip(problem.groups, evaluation.terms, present, strict=True)
     ]
-    points = [f.left[weight > 0] for f, weight in zip(freed, present, strict=True) if f.left.size]
-    noise = float(np.median(np.concatenate(points))) / chi2.median(2) if points else 0.0
-    spread = float(np.median(np.concatenate([f.gain for f in freed]))) / chi2.median(6)
+    distances = [
+        np.nan_to_num(view.distance(terms.chain.by_reading, problem.reading_std), nan=np.inf)
+        for view, terms in zip(freed, evaluation.terms, strict=True)
+    ]
+    points = [view.left[weight > 0] for view, weight in zip(freed, present, strict=True) if view.left.size]
+    # Whitened misfits are about 1, and far less only where the measurements are exact to rounding.
+    noise = max(float(np.nanmedian(np.concatenate(points))) / MEDIAN_OF_TWO if points else 0.0, EXACT)
+    spread = float(np.median(np.concatenate(distances))) / MEDIAN_OF_SIX
+    return Misfits(tuple(distances), tuple(view.left for view in freed), noise, max(noise, spread))
+
+
+def softened(problem: Problem, found: Misfits) -> Weights:
+    """Return Cauchy's weights of whole views, and no bad points: a first idea, while the chain itself is still off."""
+    groups = []
+    hard, _ = judged(problem, replace(found, spread=np.inf))
+    for weight, distance in zip(hard.groups, found.distances, strict=True):
+        soft = 1 / (1 + distance / (6 * found.spread))
+        groups.append(weight * soft.reshape(-1, *[1] * (weight.ndim - 1)))
+    return Weights(tuple(groups))
+
+
+def judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
+    """Return weights without the outliers, and what these are."""
     knocked: list[int] = []
     bad: list[tuple[int, int]] = []
     groups = []
-    for group, base, view in zip(problem.groups, present, freed, strict=True):
-        out = view.gain > chi2.isf(RARE, 6) * max(noise, spread)
+    for group, base, left, distance in zip(
+        problem.groups, all_in(problem).groups, found.left, found.distances, strict=True
+    ):
+        # A view that the prediction puts behind the camera has no distance at all.
+        out = ~(distance <= chi2.isf(RARE, 6) * found.spread)
         knocked += group.data.views[out].tolist()
         if not isinstance(group.data, PointViews):
             groups.append(np.where(out, 0.0, base))
             continue
-        wrong = (view.left > chi2.isf(RARE, 2) * noise) & (base > 0) & ~out[:, None]
-        rows, columns = np.nonzero(wrong)
+        wrong = ~(left <= chi2.isf(RARE, 2) * found.noise) & (base > 0)
+        rows, columns = np.nonzero(wrong & ~out[:, None])
         bad += zip(group.data.views[rows].tolist(), group.data.ids[rows, columns].tolist(), strict=True)
         groups.append(np.where(wrong | out[:, None], 0.0, base))
     return Weights(tuple(groups)), SetAside(tuple(sorted(knocked)), tuple(sorted(bad)))
+
+
+def point_noise(blocks: Blocks, present: Array) -> float:
+    """Return the standard deviation of a whitened point measurement, from misfits with each view's pose free.
+
+    Bad points are left out, so that what remains is a truncated noise: the few good ones lost do not matter.
+    """
+    left = _freed(blocks, present).left
+    first = float(np.nanmedian(left[present > 0])) / MEDIAN_OF_TWO
+    good = (present > 0) & (left < chi2.isf(RARE, 2) * first)
+    freedom = 2 * good.sum() - 6 * len(left)
+    return max(float(np.sqrt(left[good].sum() / max(freedom, 1))), LEAST_POINT_NOISE)
 
 
 def _freed(blocks: Blocks, present: Array) -> Freed:
     """Free each view's pose by Tukey's regression, started from least absolute misfits."""
     count, points = present.shape
     misfit = blocks.residuals.reshape(count, points, 2)
-    by_pose = blocks.jacobian[:, :, :6].reshape(count, points, 2, 6)
+    flat, right = blocks.jacobian[:, :, :6], misfit.reshape(count, -1, 1)
     weight = present / np.maximum(np.linalg.norm(misfit, axis=-1), 1e-12)
     for _ in range(FREEING_PASSES):
-        hessian = np.einsum("nq,nqik,nqil->nkl", weight, by_pose, by_pose, optimize=True)
-        gradient = np.einsum("nq,nqik,nqi->nk", weight, by_pose, misfit, optimize=True)
-        shift = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
-        left = misfit + (by_pose @ shift[:, None, :, None])[..., 0]
+        weighted = np.swapaxes(flat * np.repeat(weight, 2, axis=1)[..., None], 1, 2)
+        shift = -np.linalg.solve(weighted @ flat, weighted @ right)
+        left = (right + flat @ shift).reshape(misfit.shape)
         distance = np.linalg.norm(left, axis=-1)
-        scale = np.array([np.median(row[seen > 0]) for row, seen in zip(distance, present, strict=True)])
-        reach = TUKEY * np.maximum(scale, 1e-12)[:, None] / np.sqrt(chi2.median(2))
+        typical = _median(distance, present)
+        reach = TUKEY * np.maximum(typical, 1e-12)[:, None] / np.sqrt(MEDIAN_OF_TWO)
         weight = present * np.maximum(1 - (distance / reach) ** 2, 0) ** 2
-    kept = present * (distance < reach)
-    hessian = np.einsum("nq,nqik,nqil->nkl", kept, by_pose, by_pose, optimize=True)
-    return Freed(np.einsum("nk,nkl,nl->n", shift, hessian, shift), distance**2)
+    kept = np.repeat(present * (distance < reach), 2, axis=1)[..., None]
+    return Freed(shift[..., 0], np.swapaxes(flat * kept, 1, 2) @ flat, distance**2)
+
+
+def _median(values: Array, present: Array) -> Array:
+    """Return the median (n,) of those `values` (n, q) that are `present`."""
+    ordered = np.sort(np.where(present > 0, values, np.inf), axis=1)
+    middle = np.maximum(present.sum(axis=1).astype(int) - 1, 0) // 2
+    return np.asarray(np.take_along_axis(ordered, middle[:, None], axis=1)[:, 0])
 
 
 def _given(blocks: Blocks) -> Freed:
-    """A given pose has nothing beside itself: its whole misfit is its distance."""
-    return Freed((blocks.residuals.reshape(len(blocks.residuals), -1) ** 2).sum(axis=1), np.zeros((0,)))
+    """Return given poses as they are: the view has nothing beside them that could be bad."""
+    shift = -np.linalg.solve(blocks.hessian[:, :6, :6], blocks.gradient[:, :6, None])[..., 0]
+    return Freed(np.asarray(shift, float), blocks.hessian[:, :6, :6], np.zeros((0,)))

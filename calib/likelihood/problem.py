@@ -102,8 +102,11 @@ def offsets_at(problem: Problem, estimate: Estimate) -> tuple[Array | None, ...]
         if not isinstance(group.data, PointViews):
             offsets.append(None)
             continue
-        terms = _chain_terms(problem, group, estimate)
-        offsets.append(disk_offsets(group.data, terms.poses, lens_of(group, estimate.state), problem.disk_diameter))
+        if problem.disk_diameter is None or not group.data.disk.any():
+            offsets.append(np.zeros_like(group.data.pixels))
+            continue
+        poses = _chain_terms(problem, group, estimate).poses
+        offsets.append(disk_offsets(group.data, poses, lens_of(group, estimate.state), problem.disk_diameter))
     return tuple(offsets)
 
 
@@ -139,7 +142,9 @@ def evaluate(
     noisy = problem.reading_std > 0
     cost += float(((estimate.reading_errors[:, noisy] / problem.reading_std[noisy]) ** 2).sum())
     for prior in problem.priors:
-        away = state.lenses[prior.camera] - prior.mean
+        lens = state.lenses[prior.camera]
+        assert lens is not None
+        away = lens - prior.mean
         cost += float(away @ prior.information @ away)
     return Evaluation(tuple(terms), cost if np.isfinite(cost) else np.inf)
 

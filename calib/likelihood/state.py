@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from calib.chain import Chain
 from calib.likelihood.lens_terms import LENS_NAMES
-from calib.transforms import any_normal, transform
+from calib.transforms import any_normal
+from calib.twists import exp_twist
 
 Array = NDArray[np.float64]
 
@@ -119,45 +119,3 @@ def joint_basis(chain: Chain, joint: int) -> Array:
         return np.column_stack([np.concatenate([normal, np.zeros(3)]) for normal in normals])
     shifts = [np.concatenate([np.zeros(3), normal]) for normal in normals]
     return np.column_stack(turns + shifts)
-
-
-def joint_screw(chain: Chain, joint: int) -> Array:
-    """Return the joint's unit screw (6,), rotation first, in the world at readings 0."""
-    axis, point = chain.axes[joint], chain.points[joint]
-    if chain.revolute[joint]:
-        return np.concatenate([axis, np.cross(point, axis)])
-    return np.concatenate([np.zeros(3), axis])
-
-
-def exp_twist(twist: Array) -> Array:
-    """Return the motion (4, 4) of a twist (6,), rotation first."""
-    turn, shift = twist[:3], twist[3:]
-    angle = float(np.linalg.norm(turn))
-    rotation = Rotation.from_rotvec(turn).as_matrix()
-    if angle < 1e-12:
-        return transform(rotation, shift)
-    cross = skew(turn / angle)
-    left = (
-        np.eye(3)
-        + (2 * np.sin(angle / 2) ** 2 / angle) * cross
-        + (1 - np.sin(angle) / angle) * (cross @ cross)
-    )
-    return transform(rotation, left @ shift)
-
-
-def adjoint(motions: Array) -> Array:
-    """Return the matrices (..., 6, 6) that carry twists through `motions` (..., 4, 4)."""
-    rotation, translation = motions[..., :3, :3], motions[..., :3, 3]
-    result = np.zeros((*motions.shape[:-2], 6, 6))
-    result[..., :3, :3] = result[..., 3:, 3:] = rotation
-    result[..., 3:, :3] = skew(translation) @ rotation
-    return result
-
-
-def skew(vectors: Array) -> Array:
-    """Return the cross product matrices (..., 3, 3) of `vectors` (..., 3)."""
-    result = np.zeros((*vectors.shape, 3))
-    result[..., 0, 1], result[..., 0, 2] = -vectors[..., 2], vectors[..., 1]
-    result[..., 1, 0], result[..., 1, 2] = vectors[..., 2], -vectors[..., 0]
-    result[..., 2, 0], result[..., 2, 1] = -vectors[..., 1], vectors[..., 0]
-    return result

@@ -37,7 +37,7 @@ def pose(
         if names:
             warn(f"beyond the readings seen in calibration: {', '.join(names)}")
     poses = loaded.world_from_camera(wanted, camera)
-    print_poses(wanted, poses, loaded.base_from_world())
+    print_poses(wanted, poses, loaded.base_from_world(), loaded.pose_covariance(wanted, camera))
 
 
 def wanted_readings(readings: list[float] | None, file: Path | None, joints: list[str]) -> list[list[float]]:
@@ -60,16 +60,23 @@ def wanted_readings(readings: list[float] | None, file: Path | None, joints: lis
 
 
 def print_poses(
-    readings: list[list[float]], poses: NDArray[np.float64], base_from_world: NDArray[np.float64] | None
+    readings: list[list[float]],
+    poses: NDArray[np.float64],
+    base_from_world: NDArray[np.float64] | None,
+    covariances: NDArray[np.float64] | None,
 ) -> None:
-    """Print poses (n, 4, 4) as the command line's JSON document."""
+    """Print poses (n, 4, 4), with their covariances (n, 6, 6) where known, as the command line's JSON document."""
+    deviations = None if covariances is None else np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     entries: list[dict[str, Any]] = [
         {
             "readings": vector,
             "world_from_camera": pose.tolist(),
             "base_from_camera": None if base_from_world is None else (base_from_world @ pose).tolist(),
-            "std": {"rotation_rad": None, "position_m": None},
+            "std": {
+                "rotation_rad": None if deviations is None else deviations[index, :3].tolist(),
+                "position_m": None if deviations is None else deviations[index, 3:].tolist(),
+            },
         }
-        for vector, pose in zip(readings, poses, strict=True)
+        for index, (vector, pose) in enumerate(zip(readings, poses, strict=True))
     ]
     typer.echo(json.dumps({"poses": entries}))

@@ -1,2 +1,41 @@
-def register(app):
-    pass
+"""`activecam serve`: the daemon and its REST API."""
+
+import logging
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.logging import RichHandler
+
+from daemon.cli.console import errors, output
+from daemon.profile import load_profile
+from daemon.server import DEFAULT_HOST, DEFAULT_PORT
+from daemon.server import serve as serve_rig
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(epilog="Example: activecam serve --profile paper-table --data /var/lib/activecam")(serve)
+
+
+def serve(
+    profile: Annotated[str, typer.Option(help="The rig's profile: a file, or a shipped one's name.")],
+    data: Annotated[Path, typer.Option(help="Where runs and calibrations are kept.")] = Path(
+        "activecam-data"
+    ),
+    host: Annotated[str, typer.Option(help="The address to listen on.")] = DEFAULT_HOST,
+    port: Annotated[int, typer.Option(help="The port to listen on; 0 takes a free one.")] = DEFAULT_PORT,
+) -> None:
+    """Own the rig: move its axes, run calibrations, and answer where the camera is, by HTTP."""
+    rig = load_profile(profile)
+    _log_to_stderr()
+
+    def ready(address: str) -> None:
+        output.print(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)", soft_wrap=True)
+
+    serve_rig(rig, data, host, port, on_ready=ready)
+
+
+def _log_to_stderr() -> None:
+    handler = RichHandler(console=errors, show_path=False, markup=False)
+    logging.basicConfig(level=logging.INFO, format="%(message)s", datefmt="[%X]", handlers=[handler])

@@ -15,6 +15,7 @@ from daemon.cli.console import output, progress_line, warn
 class Method(StrEnum):
     """How to solve."""
 
+    ml = "ml"
     closed_form = "closed_form"
 
 
@@ -28,7 +29,10 @@ def solve(
     result: Annotated[Path, typer.Option("--output", "-o", help="Where to write the calibration.")] = Path(
         "calibration.json"
     ),
-    method: Annotated[Method, typer.Option(help="How to solve.")] = Method.closed_form,
+    method: Annotated[
+        Method,
+        typer.Option(help="The most likely calibration with its uncertainty, or the paper's closed form."),
+    ] = Method.ml,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON.")] = False,
 ) -> None:
     """Calibrate from a session's views: chain, camera on it, base and lens, with no initial guess."""

@@ -30,4 +30,4 @@ def truth(
     wanted = wanted_readings(readings, readings_file, [axis.spec.name for axis in loaded.axes])
     poses = np.array([world.world_from_camera(vector) for vector in wanted])
     # The base is a frame of the calibration's own choosing: the world itself has none.
-    print_poses(wanted, poses, None)
+    print_poses(wanted, poses, None, None)

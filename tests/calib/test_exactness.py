@@ -1,4 +1,4 @@
-"""On exact poses the closed form is exact: against a forward model of matrix exponentials, for any chain."""
+"""On exact poses both methods are exact: against a forward model of matrix exponentials, for any chain."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from calib import Calibration, solve
 from calib.dh import link_transform
+from calib.document import Method
 from calib.transforms import pose_error
 from tests.calib.rigs import Rig, pose_session, random_rig, rigs, sweep_session
 
@@ -26,7 +27,8 @@ def test_any_chain_in_any_order_from_any_start(
 ) -> None:
     rig, rng = drawn
     order = data.draw(st.permutations(range(len(rig.kinds))))
-    calibration = solve(sweep_session(rig, rng, order))
+    method: Method = data.draw(st.sampled_from(["closed_form", "closed_form", "closed_form", "ml"]))
+    calibration = solve(sweep_session(rig, rng, order), method)
     assert_predicts(calibration, rig, rng)
     assert all(joint.scale > 0 for joint in calibration.joints)
 
@@ -35,7 +37,7 @@ def test_any_chain_in_any_order_from_any_start(
 @given(rigs(joints=(1, 3)), st.floats(1.0, 6.0))
 def test_many_turns(drawn: tuple[Rig, np.random.Generator], turns: float) -> None:
     rig, rng = drawn
-    calibration = solve(sweep_session(rig, rng, list(range(len(rig.kinds))), turns))
+    calibration = solve(sweep_session(rig, rng, list(range(len(rig.kinds))), turns), "closed_form")
     assert_predicts(calibration, rig, rng)
 
 
@@ -44,7 +46,7 @@ def test_many_turns(drawn: tuple[Rig, np.random.Generator], turns: float) -> Non
 def test_one_joint_swept_from_several_starts(drawn: tuple[Rig, np.random.Generator]) -> None:
     rig, rng = drawn
     order = list(range(len(rig.kinds)))
-    calibration = solve(sweep_session(rig, rng, order + order))
+    calibration = solve(sweep_session(rig, rng, order + order), "closed_form")
     assert_predicts(calibration, rig, rng)
 
 
@@ -52,7 +54,7 @@ def test_one_joint_swept_from_several_starts(drawn: tuple[Rig, np.random.Generat
 @given(rigs())
 def test_dh_is_the_same_chain(drawn: tuple[Rig, np.random.Generator]) -> None:
     rig, rng = drawn
-    calibration = solve(sweep_session(rig, rng, list(range(len(rig.kinds)))))
+    calibration = solve(sweep_session(rig, rng, list(range(len(rig.kinds)))), "closed_form")
     nearly_parallel = max((abs(row.d_offset) for row in calibration.dh), default=0) > 1e3
     if nearly_parallel:
         return
@@ -73,7 +75,7 @@ def row_values(row: object) -> list[float]:
 def test_dh_conventions(drawn: tuple[Rig, np.random.Generator]) -> None:
     """Eq 12 and 13: the base is frame 1 at reading 0, and the last link has no offsets."""
     rig, rng = drawn
-    calibration = solve(sweep_session(rig, rng, list(range(len(rig.kinds)))))
+    calibration = solve(sweep_session(rig, rng, list(range(len(rig.kinds)))), "closed_form")
     first, last = calibration.dh[0], calibration.dh[-1]
     assert row_values(first)[:4] == [0, 0, 0, 0]
     assert abs(last.d_offset) < TOLERANCE

@@ -1,0 +1,97 @@
+"""A lens and the poses it was seen from, each view's pose free: the lens calibration for several views."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.likelihood.blocks import Blocks, disk_offsets, point_blocks
+from calib.likelihood.lens_terms import lens_from_vector, lens_vector
+from calib.likelihood.measurements import PointViews
+from calib.session import Intrinsics
+from calib.twists import exp_twist
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 50
+CONVERGED = 1e-3
+"""What a further step would gain, in units of one measurement's mean cost, below which it is not taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """The lens, the poses `world_from_camera` (n, 4, 4), the lens's covariance (l, l) and the residuals' rms (px)."""
+
+    lens: Intrinsics
+    poses: Array
+    covariance: Array
+    rms: float
+
+
+def adjust(
+    seen: PointViews, lens: Intrinsics, poses: Array, free: NDArray[np.bool_], disk_diameter: float | None
+) -> Bundle:
+    """Return the most likely lens and poses near these; `free` (l,) are the lens's numbers that may move."""
+    values = lens_vector(lens)
+    offsets = disk_offsets(seen, poses, lens, disk_diameter)
+    blocks = _blocks(seen, poses, values, lens, offsets)
+    damping, growth = 1e-4, 4.0
+    measurements = 2 * float(seen.present.sum())
+    for _ in range(MOST_STEPS):
+        step, twists, gain = _step(blocks, free, damping)
+        moved = poses @ exp_twist(twists), values + step
+        there = _blocks(seen, *moved, lens, offsets)
+        if not there.cost.sum() <= blocks.cost.sum():
+            damping, growth = damping * growth, growth * 2
+            if damping > 1e12:
+                break
+            continue
+        poses, values = moved
+        damping, growth = max(damping / 10, 1e-12), 4.0
+        if gain <= CONVERGED * there.cost.sum() / measurements:
+            blocks = there
+            break
+        offsets = disk_offsets(seen, poses, lens_from_vector(values, lens), disk_diameter)
+        blocks = _blocks(seen, poses, values, lens, offsets) if seen.disk.any() else there
+    variance = float(blocks.cost.sum()) / max(measurements - 6 * len(poses) - int(free.sum()), 1)
+    information, _, _ = _reduced(blocks, 0.0)
+    covariance = np.zeros_like(information)
+    covariance[np.ix_(free, free)] = variance * np.linalg.pinv(
+        information[np.ix_(free, free)], hermitian=True
+    )
+    rms = np.sqrt((blocks.residuals**2).sum(axis=-1)[seen.present > 0].mean())
+    return Bundle(lens_from_vector(values, lens), poses, covariance, float(rms))
+
+
+def _blocks(seen: PointViews, poses: Array, values: Array, lens: Intrinsics, offsets: Array) -> Blocks:
+    flat, none = np.zeros(seen.present.shape), np.zeros((*seen.present.shape, 0))
+    return point_blocks(seen, poses, values, lens.model, offsets, seen.present, flat, none)
+
+
+def _reduced(blocks: Blocks, damping: float) -> tuple[Array, Array, tuple[Array, Array]]:
+    """Return the lens's information (l, l) and gradient (l,) with each view's pose at its best, and how it follows."""
+    own = blocks.hessian[:, :6, :6]
+    own = own + damping * np.eye(6) * np.diagonal(own, axis1=1, axis2=2)[:, None, :]
+    mixed = blocks.hessian[:, :6, 6:]
+    slope = np.linalg.solve(own, mixed)
+    offset = np.linalg.solve(own, blocks.gradient[:, :6, None])[..., 0]
+    information = (blocks.hessian[:, 6:, 6:] - np.swapaxes(mixed, 1, 2) @ slope).sum(axis=0)
+    gradient = (blocks.gradient[:, 6:] - (np.swapaxes(mixed, 1, 2) @ offset[..., None])[..., 0]).sum(axis=0)
+    return (
+        np.asarray(information),
+        np.asarray(gradient),
+        (np.asarray(slope, float), np.asarray(offset, float)),
+    )
+
+
+def _step(blocks: Blocks, free: NDArray[np.bool_], damping: float) -> tuple[Array, Array, float]:
+    """Return the steps of the lens (l,) and of the poses (n, 6), and twice what they should gain."""
+    information, gradient, (slope, offset) = _reduced(blocks, damping)
+    information = information[np.ix_(free, free)]
+    step = np.zeros(len(free))
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information * np.outer(scale, scale) + damping * np.eye(len(scale))
+    step[free] = -scale * np.linalg.lstsq(scaled, scale * gradient[free], rcond=1e-14)[0]
+    twists = -offset - slope @ step
+    gain = -float(step @ blocks.gradient[:, 6:].sum(axis=0) + (twists * blocks.gradient[:, :6]).sum())
+    return step, twists, gain

@@ -1,0 +1,127 @@
+"""The closed form of a whole session: lenses, poses, the way round of a symmetric target, and the chain."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.chain import Chain
+from calib.closed_form import PoseViews, solve_chain
+from calib.errors import UnsolvableError
+from calib.lens import project_points
+from calib.lens_calibration import calibrate_camera
+from calib.observations import Observation
+from calib.orientation import agreed, carried_on
+from calib.session import Camera, Intrinsics, Session, WorldOrigin
+from calib.solution import Solution
+from calib.targets import TargetSymmetry, disk_diameter, target_points, target_symmetries
+from calib.transforms import inverse
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CameraViews:
+    """The camera's pose in every view (n, 4, 4), the lens of each camera, and warnings about them."""
+
+    poses: Array
+    lenses: list[Intrinsics | None]
+    warnings: list[str]
+
+
+def camera_views(session: Session, observations: Sequence[Observation]) -> CameraViews:
+    """Return the lens of each camera, unless it is known, and where it was in each view.
+
+    Raises UnsolvableError that names the camera.
+    """
+    points, diameter = target_points(session.target), disk_diameter(session.target)
+    poses = np.zeros((len(observations), 4, 4))
+    lenses: list[Intrinsics | None] = []
+    warnings: list[str] = []
+    for index, camera in enumerate(session.cameras):
+        lens = camera.intrinsics
+        own = [i for i, o in enumerate(observations) if o.camera == index and o.pose is None]
+        if own:
+            views = [observations[i] for i in own]
+            try:
+                found = calibrate_camera(points, views, _picture_size(camera), diameter, lens)
+            except UnsolvableError as error:
+                raise UnsolvableError(f"camera '{camera.name}': {error}") from error
+            lens, poses[own] = found.lens, found.poses
+            warnings += [f"camera '{camera.name}': {warning}" for warning in found.warnings]
+        lenses.append(lens)
+    for i, observation in enumerate(observations):
+        if observation.pose is not None:
+            poses[i] = observation.pose
+    return CameraViews(poses, lenses, warnings)
+
+
+def _picture_size(camera: Camera) -> tuple[int, int]:
+    if camera.width is None or camera.height is None:
+        raise UnsolvableError("its width and height are not given; add them to the session's cameras")
+    return camera.width, camera.height
+
+
+def first_solution(session: Session, observations: Sequence[Observation], seen: CameraViews) -> Solution:
+    """Solve the chain in closed form, with a symmetric target taken the same way round in all views.
+
+    Raises UnsolvableError that names the joint or camera which the views do not determine.
+    """
+    if not session.joints:
+        return Solution(Chain.of([], [], [], []), None, seen.lenses)
+    views = PoseViews.of(session, [observation.view for observation in observations], seen.poses)
+    symmetries = target_symmetries(session.target)
+
+    def solved(poses: Array) -> tuple[Chain, Array]:
+        return solve_chain(session, replace(views, poses=poses))
+
+    if not symmetries:
+        return Solution(*solved(seen.poses), seen.lenses)
+    turnable = np.array([observation.pose is None for observation in observations])
+    views = replace(views, poses=carried_on(views, symmetries, turnable))
+    poses, (chain, mounts) = agreed(views, symmetries, turnable, solved)
+    solution = Solution(chain, mounts, seen.lenses, session.origin)
+    if session.origin is None:
+        return replace(solution, origin=_first_origin(session, solution, observations[0].view))
+    turn = _turn_to_origin(session, session.origin, solution, symmetries)
+    if turn is None:
+        return solution
+    chain, mounts = solved(turn.turned_from_world @ poses)
+    return replace(solution, chain=chain, mounts=mounts)
+
+
+def _first_origin(session: Session, solution: Solution, view: int) -> WorldOrigin | None:
+    """Return where `view` sees the world's origin: the choice that later solutions keep."""
+    seen = session.views[view]
+    camera = session.camera_index(seen)
+    pixel = _pixel_of(session, solution, camera, seen.readings, np.zeros(3))
+    if pixel is None:
+        return None
+    return WorldOrigin(
+        camera=session.cameras[camera].name, readings=seen.readings, pixel=[*map(float, pixel)]
+    )
+
+
+def _turn_to_origin(
+    session: Session, origin: WorldOrigin, solution: Solution, symmetries: Sequence[TargetSymmetry]
+) -> TargetSymmetry | None:
+    """Return the turn of the world after which its origin is seen where `origin` says; None for none."""
+    points = target_points(session.target)
+    camera = [camera.name for camera in session.cameras].index(origin.camera)
+    corners = [points[0], *(points[turn.permutation[0]] for turn in symmetries)]
+    seen = [_pixel_of(session, solution, camera, origin.readings, corner) for corner in corners]
+    misses = [np.inf if pixel is None else float(np.linalg.norm(pixel - origin.pixel)) for pixel in seen]
+    best = int(np.argmin(misses))
+    return None if best == 0 else symmetries[best - 1]
+
+
+def _pixel_of(
+    session: Session, solution: Solution, camera: int, readings: list[float], point: Array
+) -> Array | None:
+    lens = solution.lenses[camera]
+    if lens is None or solution.mounts is None:
+        return None
+    pose = solution.chain.poses(readings, session.camera_link(camera), solution.mounts[camera])
+    pixel = project_points((inverse(pose) @ [*point, 1.0])[:3], lens)
+    return pixel if np.isfinite(pixel).all() else None

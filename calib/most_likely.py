@@ -1,0 +1,95 @@
+"""The maximum-likelihood solution of a session, from the closed form's."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.likelihood.document_covariance import document_jacobian
+from calib.likelihood.refinement import Refined, Start, refine
+from calib.observations import Observation
+from calib.residuals import read_as_predicted
+from calib.session import Session
+from calib.solution import Solution
+from calib.targets import NoTarget, Target
+
+Array = NDArray[np.float64]
+
+
+def most_likely(session: Session, observations: Sequence[Observation], start: Solution) -> Solution:
+    """Return the most likely solution near the closed form's, with its covariance and what did not belong."""
+    assert start.mounts is not None
+    oriented = [_as_the_chain_has_it(session, start, observation) for observation in observations]
+    refined = refine(session, oriented, Start(start.chain, start.mounts, start.lenses))
+    state, aside = refined.state, refined.set_aside
+    # A prismatic axis may lie anywhere: through cameras[0]'s centre is the convention.
+    chain = state.chain
+    feet = chain.points - (chain.points * chain.axes).sum(axis=1, keepdims=True) * chain.axes
+    points = np.where(chain.revolute[:, None], feet, state.mounts[0, :3, 3])
+    return replace(
+        start,
+        chain=replace(chain, points=points),
+        mounts=state.mounts,
+        lenses=refined.lenses(),
+        covariance=_document_covariance(session, refined),
+        left_out=(aside.views, aside.points),
+    )
+
+
+def _as_the_chain_has_it(session: Session, start: Solution, observation: Observation) -> Observation:
+    """Return the observation read the way round that the closed form's chain has it."""
+    lens = start.lenses[observation.camera]
+    if observation.pose is not None or lens is None:
+        return observation
+    assert start.mounts is not None
+    link, readings = session.camera_link(observation.camera), session.views[observation.view].readings
+    predicted = start.chain.poses(readings, link, start.mounts[observation.camera])
+    return read_as_predicted(observation, session.target, lens, predicted)[0]
+
+
+def _document_covariance(session: Session, refined: Refined) -> tuple[list[str], Array]:
+    models = [None if lens is None else lens.model for lens in refined.lenses()]
+    names, jacobian = document_jacobian(refined.state, refined.problem.layout, models)
+    covariance = jacobian @ refined.covariance @ jacobian.T
+    # A print that is larger than it says scales every length, and shows in no residual.
+    size = _lengths(names, refined) * _print_scale_std(session.target)
+    return names, covariance + np.outer(size, size)
+
+
+def _lengths(names: list[str], refined: Refined) -> Array:
+    """Return the document's numbers that are lengths, or lengths a reading, and zeros for the others."""
+    state, values = refined.state, np.zeros(len(names))
+    place = {name: index for index, name in enumerate(names)}
+    for joint, revolute in enumerate(state.chain.revolute):
+        axis, point = state.chain.axes[joint], state.chain.points[joint]
+        point = point - (point @ axis) * axis if revolute else state.mounts[0, :3, 3]
+        for i in range(3):
+            values[place[f"joints.{joint}.point.{i}"]] = point[i]
+        if not revolute:
+            values[place[f"joints.{joint}.scale"]] = state.chain.scales[joint]
+    for camera, mount in enumerate(state.mounts):
+        for i in range(3):
+            values[place[f"cameras.{camera}.world_from_camera.{i}.3"]] = mount[i, 3]
+    return values
+
+
+def _print_scale_std(target: Target) -> float:
+    """Return the relative standard deviation of the print's scale."""
+    if isinstance(target, NoTarget) or target.pitch_std is None:
+        return 0.0
+    return target.pitch_std / target.pitch
+
+
+def left_out_in_words(solution: Solution) -> list[str]:
+    """Return a sentence for each view, and for each view's points, that did not belong."""
+    views, points = solution.left_out
+    sentences = [
+        f"view {view} does not agree with the others and was set aside: its readings may be wrong, or it was knocked"
+        for view in views
+    ]
+    return sentences + [
+        f"view {view}: {count} of its points lie far from where all others say, and were set aside"
+        for view, count in sorted(Counter(view for view, _ in points).items())
+    ]

@@ -1,0 +1,72 @@
+"""How sure a calibration is of a pose: the covariance of its own numbers, carried through the chain. numpy alone.
+
+The pose's covariance is of world_from_camera Exp(xi), xi = (rotation, position) in the camera's frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.chain import Chain
+from calib.transforms import inverse
+from calib.twists import adjoint, joint_screw, skew
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TwistCovariance:
+    """The covariance (q, q) of one camera's chain: for each joint a twist and its relative scale, the mount's twist."""
+
+    matrix: Array
+
+
+def twist_covariance(
+    chain: Chain, mount: Array, camera: int, link: int, parameters: Sequence[str], matrix: Array
+) -> TwistCovariance:
+    """Return what the document's covariance says of the first `link` joints and of the camera's mount (4, 4).
+
+    `matrix` (p, p) is that of the numbers called `parameters`, by their dotted paths in the document.
+    """
+    place = {name: index for index, name in enumerate(parameters)}
+    jacobian = np.zeros((7 * link + 6, len(parameters)))
+    for joint in range(link):
+        rows = jacobian[7 * joint : 7 * joint + 7]
+        axis, point = chain.axes[joint], chain.points[joint]
+        turn = skew(axis)
+        _put(rows[:3], place, [f"joints.{joint}.axis.{i}" for i in range(3)], turn)
+        _put(rows[3:6], place, [f"joints.{joint}.axis.{i}" for i in range(3)], skew(point) @ turn)
+        _put(rows[3:6], place, [f"joints.{joint}.point.{i}" for i in range(3)], np.eye(3))
+        _put(rows[6:7], place, [f"joints.{joint}.scale"], np.array([[1 / chain.scales[joint]]]))
+    rows, back = jacobian[7 * link :], mount[:3, :3].T
+    for column in range(3):
+        names = [f"cameras.{camera}.world_from_camera.{row}.{column}" for row in range(3)]
+        # omega is half the sum of e_c x (R' dR e_c) over the columns c.
+        _put(rows[:3], place, names, 0.5 * skew(np.eye(3)[column]) @ back)
+    _put(rows[3:], place, [f"cameras.{camera}.world_from_camera.{row}.3" for row in range(3)], back)
+    return TwistCovariance(jacobian @ matrix @ jacobian.T)
+
+
+def _put(rows: Array, place: dict[str, int], names: list[str], values: Array) -> None:
+    for column, name in enumerate(names):
+        if name in place:
+            rows[:, place[name]] += values[:, column]
+
+
+def pose_covariances(chain: Chain, mount: Array, link: int, known: TwistCovariance, readings: Array) -> Array:
+    """Return the covariances (n, 6, 6) of the poses at `readings` (n, m) of a camera that `link` joints move."""
+    count = len(readings)
+    jacobian = np.zeros((count, 6, 7 * link + 6))
+    after = np.broadcast_to(inverse(mount), (count, 4, 4))
+    carried = adjoint(after)
+    for joint in reversed(range(link)):
+        before = after @ inverse(chain.motion(joint, readings[:, joint]))
+        carried_before = adjoint(before)
+        jacobian[:, :, 7 * joint : 7 * joint + 6] = carried_before - carried
+        turning = carried_before @ joint_screw(chain, joint)
+        jacobian[:, :, 7 * joint + 6] = turning * (chain.scales[joint] * readings[:, joint, None])
+        after, carried = before, carried_before
+    jacobian[:, :, 7 * link :] = np.eye(6)
+    return np.asarray(jacobian @ known.matrix @ np.swapaxes(jacobian, 1, 2))

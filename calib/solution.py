@@ -1,0 +1,28 @@
+"""What a solver found, before it is written down."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.chain import Chain
+from calib.session import Intrinsics, WorldOrigin
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens; None where there is none.
+
+    `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
+    their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong.
+    """
+
+    chain: Chain
+    mounts: Array | None
+    lenses: list[Intrinsics | None]
+    origin: WorldOrigin | None = None
+    covariance: tuple[list[str], Array] | None = None
+    left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
