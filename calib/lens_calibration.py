@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.bundle import Bundle, adjust
+from calib.bundle import adjust
 from calib.disks import centroid_offsets
 from calib.errors import UnsolvableError
 from calib.homography import first_focal_lengths, homographies, planar_poses
@@ -119,14 +119,15 @@ def _several(
     if not enough.all():
         others = [observation for observation, use in zip(observations, enough, strict=True) if not use]
         poses[~enough] = _poses_of_known_lens(points, others, bundle.lens, disk_diameter)
-    return CameraViews(bundle.lens, poses, _lens_warnings(bundle))
-
-
-def _lens_warnings(bundle: Bundle) -> list[str]:
     relative = float(np.sqrt(bundle.covariance[0, 0])) / bundle.lens.fx
-    if relative <= POORLY_KNOWN:
+    return CameraViews(bundle.lens, poses, focal_length_warnings(relative))
+
+
+def focal_length_warnings(relative_std: float) -> list[str]:
+    """Return a sentence where the focal length is known worse than every distance should be."""
+    if relative_std <= POORLY_KNOWN:
         return []
     return [
-        f"the focal length is known to {100 * relative:.1f} % only, and with it every distance: "
+        f"the focal length is known to {100 * relative_std:.1f} % only, and with it every distance: "
         "tilt the target against the picture by 20 degrees or more, or give known intrinsics"
     ]

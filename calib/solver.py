@@ -4,7 +4,7 @@ from calib.calibration import Calibration, Quality
 from calib.document import Method, document
 from calib.errors import UnsolvableError
 from calib.first_solution import camera_views, first_solution
-from calib.most_likely import left_out_in_words, most_likely
+from calib.most_likely import in_words, most_likely
 from calib.observations import Progress, observe
 from calib.quality import judged
 from calib.session import Session
@@ -31,10 +31,11 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
         )
     seen = camera_views(session, fit)
     solution = first_solution(session, fit, seen)
-    warnings = [*([] if cut_off is None else [cut_off]), *seen.warnings, *observed.missing]
+    warnings = seen.warnings
     if method == "ml" and session.joints:
         solution = most_likely(session, fit, solution)
-        warnings += left_out_in_words(solution)
+        warnings = in_words(session, solution)
+    warnings = [*([] if cut_off is None else [cut_off]), *warnings, *observed.missing]
     calibration = document(session, method, solution, Quality())
     quality = judged(calibration, session, observed.observations, warnings)
     return calibration.model_copy(update={"quality": quality})

@@ -28,7 +28,7 @@ class CalibrationEntry(BaseModel):
 
     id: str
     created_at: datetime
-    method: str = Field(examples=["closed_form"])
+    method: str = Field(examples=["ml"])
     active: bool = Field(description="Whether poses are computed from it.")
     run_id: str | None = Field(description="The run that found it.")
 

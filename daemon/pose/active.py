@@ -17,12 +17,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:
-    """Poses at n readings: transforms (n, 4, 4), quaternions (n, 4; x, y, z, w), joints beyond the range."""
+    """Poses at n readings: transforms (n, 4, 4), quaternions (n, 4; x, y, z, w), joints beyond the range.
+
+    `covariance` (n, 6, 6) is of rotation (rad), then position (m), in the camera's frame; None where it is not known.
+    """
 
     readings: Array
     world_from_camera: Array
     base_from_camera: Array
     quaternion: Array
+    covariance: Array | None
     out_of_range: list[list[str]]
 
 
@@ -79,6 +83,7 @@ class ActiveCalibration:
             world_from_camera,
             self.base_from_world @ world_from_camera,
             quaternions(world_from_camera[:, :3, :3]),
+            self.calibration.pose_covariance(readings, name),
             self._out_of_range(readings),
         )
 

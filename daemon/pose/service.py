@@ -129,7 +129,6 @@ def _pose_fields(poses: Poses, index: int) -> dict[str, Any]:
         "base_from_camera": poses.base_from_camera[index].tolist(),
         "position": world_from_camera[:3, 3].tolist(),
         "quaternion": poses.quaternion[index].tolist(),
-        # A closed form knows no covariance.
-        "covariance": None,
+        "covariance": None if poses.covariance is None else poses.covariance[index].tolist(),
         "out_of_range": poses.out_of_range[index],
     }

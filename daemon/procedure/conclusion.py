@@ -46,7 +46,7 @@ async def conclude(folder: Path, log: EventLog) -> Conclusion:
 def _solve(folder: Path, tell: Callable[[str], None]) -> Calibration:
     from calib import solve  # it brings scipy, which a daemon that only serves poses does without
 
-    return solve(load_session(folder), method="closed_form", progress=tell)
+    return solve(load_session(folder), progress=tell)
 
 
 def _verify(calibration: Calibration, folder: Path) -> dict[str, Any] | None:

@@ -20,7 +20,7 @@ from tests.daemon.motions import home_all, until
 
 POSITION = 2e-3
 ROTATION = 5e-3
-"""What the closed form reaches on this rig's little pictures (m, rad), with a margin of five."""
+"""What the fit reaches on this rig's little pictures (m, rad), with a margin of five."""
 
 
 @pytest.fixture
@@ -73,7 +73,9 @@ async def test_an_answer_says_how_old_and_how_far_out_it_is(
 ) -> None:
     inside = (await client.get("/pose", params={"camera": "main"})).json()
     assert inside["out_of_range"] == []
-    assert inside["covariance"] is None
+    covariance = np.array(inside["covariance"])
+    assert covariance.shape == (6, 6)
+    assert (np.linalg.eigvalsh(covariance) > 0).all()
     assert 0 <= inside["age_s"] < 2
     assert inside["timestamp"].endswith("Z")
     await calibrated.rig.move({"pan": 15.0})

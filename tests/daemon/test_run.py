@@ -58,7 +58,7 @@ async def test_a_run_ends_with_an_active_calibration(service: Service) -> None:
     assert run.calibration_id is not None
     stored = await service.store.calibration(run.calibration_id)
     assert json.loads(stored.document) == json.loads((folder / "calibration.json").read_text())
-    assert load_calibration(folder / "calibration.json").method == "closed_form"
+    assert load_calibration(folder / "calibration.json").method == "ml"
 
 
 async def test_a_view_says_how_it_was_taken(service: Service) -> None:
