@@ -23,11 +23,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class CameraViews:
-    """The camera's pose in every view (n, 4, 4), the lens of each camera, and warnings about them."""
+    """The camera's pose in every view (n, 4, 4), the lens of each camera, and how well it is known.
+
+    `focal_std` are the focal lengths' relative standard deviations, 0 for what needed none, None for a single view's.
+    """
 
     poses: Array
     lenses: list[Intrinsics | None]
-    warnings: list[str]
+    focal_std: list[float | None]
 
 
 def camera_views(session: Session, observations: Sequence[Observation]) -> CameraViews:
@@ -38,9 +41,10 @@ def camera_views(session: Session, observations: Sequence[Observation]) -> Camer
     points, diameter = target_points(session.target), disk_diameter(session.target)
     poses = np.zeros((len(observations), 4, 4))
     lenses: list[Intrinsics | None] = []
-    warnings: list[str] = []
+    focal_std: list[float | None] = []
     for index, camera in enumerate(session.cameras):
         lens = camera.intrinsics
+        known_to: float | None = 0.0
         own = [i for i, o in enumerate(observations) if o.camera == index and o.pose is None]
         if own:
             views = [observations[i] for i in own]
@@ -48,13 +52,13 @@ def camera_views(session: Session, observations: Sequence[Observation]) -> Camer
                 found = calibrate_camera(points, views, _picture_size(camera), diameter, lens)
             except UnsolvableError as error:
                 raise UnsolvableError(f"camera '{camera.name}': {error}") from error
-            lens, poses[own] = found.lens, found.poses
-            warnings += [f"camera '{camera.name}': {warning}" for warning in found.warnings]
+            lens, poses[own], known_to = found.lens, found.poses, found.focal_std
         lenses.append(lens)
+        focal_std.append(known_to)
     for i, observation in enumerate(observations):
         if observation.pose is not None:
             poses[i] = observation.pose
-    return CameraViews(poses, lenses, warnings)
+    return CameraViews(poses, lenses, focal_std)
 
 
 def _picture_size(camera: Camera) -> tuple[int, int]:

@@ -30,11 +30,15 @@ POORLY_KNOWN = 0.02
 
 @dataclass(frozen=True, eq=False)
 class CameraViews:
-    """A lens, the poses `world_from_camera` (n, 4, 4) at which it explains the views, warnings in words."""
+    """A lens, and the poses `world_from_camera` (n, 4, 4) at which it explains the views.
+
+    `focal_std` is the standard deviation of its focal length, relative to it: 0 where it was known, None where a
+    single view says nothing of it.
+    """
 
     lens: Intrinsics
     poses: Array
-    warnings: list[str]
+    focal_std: float | None
 
 
 def calibrate_camera(
@@ -52,7 +56,7 @@ def calibrate_camera(
     far.
     """
     if known is not None:
-        return CameraViews(known, _poses_of_known_lens(points, observations, known, disk_diameter), [])
+        return CameraViews(known, _poses_of_known_lens(points, observations, known, disk_diameter), 0.0)
     most = max(len(observation.ids) for observation in observations)
     if most < FEWEST_POINTS:
         raise UnsolvableError(
@@ -85,8 +89,7 @@ def _single(
             pixels = seen.pixels - centroid_offsets(world, camera_from_world, disk_diameter, found.intrinsics)
             found = tsai(world, pixels, centre)
     lens = found.intrinsics.model_copy(update={"width": size[0], "height": size[1]})
-    warning = "the lens is known from a single view only: take several, tilted differently"
-    return CameraViews(lens, found.world_from_camera[None], [warning])
+    return CameraViews(lens, found.world_from_camera[None], None)
 
 
 def _several(
@@ -119,15 +122,18 @@ def _several(
     if not enough.all():
         others = [observation for observation, use in zip(observations, enough, strict=True) if not use]
         poses[~enough] = _poses_of_known_lens(points, others, bundle.lens, disk_diameter)
-    relative = float(np.sqrt(bundle.covariance[0, 0])) / bundle.lens.fx
-    return CameraViews(bundle.lens, poses, focal_length_warnings(relative))
+    return CameraViews(bundle.lens, poses, float(np.sqrt(bundle.covariance[0, 0])) / bundle.lens.fx)
 
 
-def focal_length_warnings(relative_std: float) -> list[str]:
-    """Return a sentence where the focal length is known worse than every distance should be."""
-    if relative_std <= POORLY_KNOWN:
+def lens_in_words(camera: str, focal_std: float | None) -> list[str]:
+    """Return a sentence where a camera's lens is known worse than every distance should be."""
+    if focal_std is None:
+        return [
+            f"camera '{camera}': its lens is known from a single view only: take several, tilted differently"
+        ]
+    if focal_std <= POORLY_KNOWN:
         return []
     return [
-        f"the focal length is known to {100 * relative_std:.1f} % only, and with it every distance: "
+        f"camera '{camera}': the focal length is known to {100 * focal_std:.1f} % only, and with it every distance: "
         "tilt the target against the picture by 20 degrees or more, or give known intrinsics"
     ]

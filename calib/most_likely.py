@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.lens_calibration import focal_length_warnings
 from calib.likelihood.document_covariance import document_jacobian
 from calib.likelihood.refinement import Refined, Start, refine
 from calib.observations import Observation
@@ -83,19 +82,21 @@ def _print_scale_std(target: Target) -> float:
     return target.pitch_std / target.pitch
 
 
-def in_words(session: Session, solution: Solution) -> list[str]:
-    """Return what a person should know of the solution: lenses that are poorly known, and what did not belong."""
+def focal_std(solution: Solution) -> list[float | None]:
+    """Return the relative standard deviation of each camera's focal length, 0 where it has no lens."""
     assert solution.covariance is not None
     names, matrix = solution.covariance
-    sentences = []
-    for index, (camera, lens) in enumerate(zip(session.cameras, solution.lenses, strict=True)):
-        if lens is None:
-            continue
-        place = names.index(f"cameras.{index}.intrinsics.fx")
-        relative = float(np.sqrt(matrix[place, place])) / lens.fx
-        sentences += [f"camera '{camera.name}': {warning}" for warning in focal_length_warnings(relative)]
+    deviations = dict(zip(names, np.sqrt(np.diag(matrix)), strict=True))
+    return [
+        0.0 if lens is None else float(deviations[f"cameras.{index}.intrinsics.fx"] / lens.fx)
+        for index, lens in enumerate(solution.lenses)
+    ]
+
+
+def left_out_in_words(solution: Solution) -> list[str]:
+    """Return a sentence for each view, and for each view's points, that did not belong."""
     views, points = solution.left_out
-    sentences += [
+    sentences = [
         f"view {view} does not agree with the others and was set aside: its readings may be wrong, or it was knocked"
         for view in views
     ]

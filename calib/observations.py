@@ -1,6 +1,6 @@
 """What was measured, as arrays: each view's points found in its picture, or given, or its pose."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -54,8 +54,10 @@ class Observed:
         return [observation for observation in self.observations if observation.view in views]
 
 
-def observe(session: Session, progress: Progress | None = None) -> Observed:
-    """Return what each view measured, finding the target in its picture where it carries one.
+def observe(
+    session: Session, progress: Progress | None = None, only: Sequence[int] | None = None
+) -> Observed:
+    """Return what each view measured, or those of places `only`, finding the target in its picture.
 
     A picture in which the target is not found is left out and named. Raises ImageError for a picture that
     is missing or unreadable, and UnsolvableError where no view shows the target or there are no views at
@@ -64,17 +66,17 @@ def observe(session: Session, progress: Progress | None = None) -> Observed:
     if not session.views:
         raise UnsolvableError("the session has no views: take some before solving it")
     observations, missing = [], []
-    for index, view in enumerate(session.views):
+    wanted = range(len(session.views)) if only is None else only
+    for count, index in enumerate(wanted, start=1):
+        view = session.views[index]
         if progress is not None and view.image is not None:
-            progress(f"looking for the target in view {index + 1} of {len(session.views)}")
+            progress(f"looking for the target in view {count} of {len(wanted)}")
         try:
             observations.append(_observation(session, index, view))
         except DetectionError as error:
             missing.append(f"view {index} ({view.image}): {error}")
     if not observations:
-        raise UnsolvableError(
-            f"the target was not found in any of the {len(session.views)} views: {missing[0]}"
-        )
+        raise UnsolvableError(f"the target was not found in any of the {len(wanted)} views: {missing[0]}")
     return Observed(observations, missing)
 
 

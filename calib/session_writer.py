@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.documents import write_durably, write_json
 from calib.errors import ImageError
-from calib.session import Session, View
+from calib.session import Session, View, WorldOrigin
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -50,3 +50,14 @@ class SessionWriter:
             raise ImageError(f"{self.folder / name}: the picture could not be encoded as PNG")
         write_durably(self.folder / name, data.tobytes())
         return self.add(view)
+
+
+def keep_origin(session: Session, origin: WorldOrigin | None) -> None:
+    """Store in the session on disk which way round its symmetric target was taken, so that it stays that way.
+
+    The first choice stays. Raises OSError where the session cannot be written to.
+    """
+    if origin is None or session.origin is not None:
+        return
+    kept = session.model_copy(update={"origin": origin})
+    write_json(session.folder / "session.json", kept)

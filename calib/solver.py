@@ -4,7 +4,8 @@ from calib.calibration import Calibration, Quality
 from calib.document import Method, document
 from calib.errors import UnsolvableError
 from calib.first_solution import camera_views, first_solution
-from calib.most_likely import in_words, most_likely
+from calib.lens_calibration import lens_in_words
+from calib.most_likely import focal_std, left_out_in_words, most_likely
 from calib.observations import Progress, observe
 from calib.quality import judged
 from calib.session import Session
@@ -31,11 +32,16 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
         )
     seen = camera_views(session, fit)
     solution = first_solution(session, fit, seen)
-    warnings = seen.warnings
+    lens_std = seen.focal_std
     if method == "ml" and session.joints:
         solution = most_likely(session, fit, solution)
-        warnings = in_words(session, solution)
-    warnings = [*([] if cut_off is None else [cut_off]), *warnings, *observed.missing]
+        lens_std = [
+            None if before is None else now for before, now in zip(lens_std, focal_std(solution), strict=True)
+        ]
+    warnings = [] if cut_off is None else [cut_off]
+    for camera, std in zip(session.cameras, lens_std, strict=True):
+        warnings += lens_in_words(camera.name, std)
+    warnings += [*left_out_in_words(solution), *observed.missing]
     calibration = document(session, method, solution, Quality())
     quality = judged(calibration, session, observed.observations, warnings)
     return calibration.model_copy(update={"quality": quality})

@@ -99,9 +99,8 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
     """
     _require_same_rig(calibration, session)
     marked = any(view.use == "verify" for view in session.views)
-    judged = [view for view in session.views if view.use == "verify" or not marked]
-    session = session.with_views(judged)
-    observed = observe(session, progress)
+    judged = [index for index, view in enumerate(session.views) if view.use == "verify" or not marked]
+    observed = observe(session, progress, judged)
     residuals = [
         view_residual(calibration, session, observation, measure_pose=True)
         for observation in observed.observations

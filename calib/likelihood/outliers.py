@@ -21,6 +21,8 @@ RARE = 1e-5
 """How rarely a good measurement may be set aside."""
 TUKEY = 4.685
 FREEING_PASSES = 10
+STUDENT = 4.0
+"""Degrees of freedom of given poses' errors: other systems have longer tails than a picture's points."""
 EXACT = 0.1
 LEAST_POINT_NOISE = 1e-5
 """In px, or of what a covariance says: better is not measured, and made-up points may be exact."""
@@ -108,7 +110,7 @@ def judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
         out = ~(distance <= chi2.isf(RARE, 6) * found.spread)
         knocked += group.data.views[out].tolist()
         if not isinstance(group.data, PointViews):
-            groups.append(np.where(out, 0.0, base))
+            groups.append(np.where(out, 0.0, base * (STUDENT + 6) / (STUDENT + distance)))
             continue
         wrong = ~(left <= chi2.isf(RARE, 2) * found.noise) & (base > 0)
         rows, columns = np.nonzero(wrong & ~out[:, None])

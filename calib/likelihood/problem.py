@@ -1,6 +1,6 @@
 """The likelihood: which measurements there are, what is free, and what is known beforehand."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +38,10 @@ class Prior:
 class Problem:
     """A session as a likelihood.
 
-    `readings` (n, m) are those of all the session's views, `regressors` (n, m, k) say how much of each correction is
-    added to them, `reading_std` (m,) how noisy they are. `free` (p,) are the parameters that may move. `bulges`
-    (t, w) are the shapes of the target's warp at its points.
+    `readings` (n, m) are those of all the session's views, `regressors` (n, m, k) say how much of each correction
+    is added to them, `reading_std` (m,) how noisy they are, and `noisiness` (n, m) how much of
+    that noise each has: the mean of an idle joint's readings over a sweep has less. `free` (p,) are the
+    parameters that may move. `bulges` (t, w) are the shapes of the target's warp at its points.
     """
 
     layout: Layout
@@ -48,6 +49,7 @@ class Problem:
     readings: Array
     regressors: Array
     reading_std: Array
+    noisiness: Array
     free: NDArray[np.bool_]
     priors: tuple[Prior, ...]
     disk_diameter: float | None
@@ -56,7 +58,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A state, and how far each view's true readings are from what was read (n, m)."""
+    """A state, and how far each view's true readings are from what was read (n, m), over their noisiness."""
 
     state: State
     reading_errors: Array
@@ -151,7 +153,9 @@ def evaluate(
 
 def _chain_terms(problem: Problem, group: Group, estimate: Estimate) -> ChainTerms:
     views = group.data.views
-    readings = problem.readings[views] + estimate.reading_errors[views]
-    return chain_terms(
+    noisiness = problem.noisiness[views]
+    readings = problem.readings[views] + noisiness * estimate.reading_errors[views]
+    terms = chain_terms(
         estimate.state, problem.layout, group.camera, group.link, readings, problem.regressors[views]
     )
+    return replace(terms, by_reading=terms.by_reading * noisiness[:, None, :])

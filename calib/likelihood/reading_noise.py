@@ -15,6 +15,8 @@ from scipy.optimize import minimize
 Array = NDArray[np.float64]
 
 SUSPICIOUS = 3.0
+FARTHEST = 12.0
+"""How far the logarithm of a standard deviation may be from what a single view just shows."""
 GAIN = 10.0
 """What twice the log-likelihood must gain for a joint's readings to count as noisy."""
 
@@ -64,23 +66,24 @@ def _suspicion(misfits: Sequence[PoseMisfit]) -> Array:
 
 
 def _resolved(misfits: Sequence[PoseMisfit]) -> Array:
-    """Return the reading error (m,) of each joint that a single view would just show."""
+    """Return the reading error (m,) of each joint that a single view in which it moved would just show."""
     seen = np.concatenate(
         [np.einsum("nkm,nkl,nlm->nm", v.by_reading, v.information, v.by_reading) for v in misfits]
     )
-    return np.asarray(1 / np.sqrt(np.maximum(np.median(seen, axis=0), 1e-300)))
+    # A joint moves in some of the views only: in the others its reading is a mean, which shows less.
+    return np.asarray(1 / np.sqrt(np.maximum(np.quantile(seen, 0.9, axis=0), 1e-300)))
 
 
 def _optimised(misfits: Sequence[PoseMisfit], start: Array, free: NDArray[np.bool_]) -> Array:
     def cost(logarithms: Array) -> float:
         std = start.copy()
-        std[free] = np.exp(logarithms)
+        std[free] = np.exp(np.clip(logarithms, first - FARTHEST, first + FARTHEST))
         return _misfit(misfits, std)
 
     first = np.log(start[free])
     found = minimize(cost, first, method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.05})
     std = start.copy()
-    std[free] = np.exp(found.x)
+    std[free] = np.exp(np.clip(found.x, first - FARTHEST, first + FARTHEST))
     return std
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import Chain
+from calib.closed_form import PoseViews
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector
 from calib.likelihood.measurements import GivenPoses, PointViews, point_views
@@ -26,6 +27,7 @@ from calib.likelihood.state import Layout, State
 from calib.likelihood.uncertainty import noise_variance, step_covariance
 from calib.observations import Observation
 from calib.session import Intrinsics, Session
+from calib.sweeps import readings_at_rest, sweep_labels
 from calib.targets import disk_diameter, target_points
 
 Array = NDArray[np.float64]
@@ -116,12 +118,13 @@ def _problem(session: Session, observations: Sequence[Observation], start: Start
             views = np.array([observation.view for observation in given], dtype=np.intp)
             poses = np.array([observation.pose for observation in given])
             groups.append(Group(index, link, None, GivenPoses(views, poses, np.eye(6))))
-    readings = session.readings()
+    readings, noisiness = _readings_and_noisiness(session)
     problem = Problem(
         layout=layout,
         groups=tuple(groups),
         readings=readings,
         regressors=np.zeros((*readings.shape, 0)),
+        noisiness=noisiness,
         reading_std=np.array([joint.reading_std or 0.0 for joint in session.joints]),
         free=free,
         priors=(),
@@ -129,6 +132,19 @@ def _problem(session: Session, observations: Sequence[Observation], start: Start
         bulges=np.zeros((len(points), 0)),
     )
     return problem, Estimate(state, np.zeros_like(readings))
+
+
+def _readings_and_noisiness(session: Session) -> tuple[Array, Array]:
+    """Return all views' readings (n, m), idle joints' averaged over their sweep, and how much noise each still has."""
+    every = PoseViews.of(session, range(len(session.views)), np.zeros((len(session.views), 4, 4)))
+    labels = sweep_labels(every.readings, every.exercised, every.cameras, every.links)
+    noisiness = np.ones_like(every.readings)
+    for joint in range(labels.shape[1]):
+        for sweep in np.unique(labels[labels[:, joint] >= 0, joint]):
+            members = labels[:, joint] == sweep
+            noisiness[members] = 1 / np.sqrt(members.sum())
+            noisiness[members, joint] = 1
+    return readings_at_rest(every.readings, labels), noisiness
 
 
 def _approached(problem: Problem, estimate: Estimate) -> tuple[Problem, Estimate, Weights, SetAside]:
@@ -173,20 +189,21 @@ def _with_measurement_noise(problem: Problem, everything: Evaluation, weights: W
             scale = point_noise(terms.blocks, group.data.present)
             data: PointViews | GivenPoses = replace(group.data, whitening=group.data.whitening / scale)
         else:
-            residuals = terms.blocks.residuals[weight > 0, :, 0] @ np.linalg.inv(group.data.whitening).T
-            data = replace(group.data, whitening=_whitening(np.asarray(residuals, float), spent))
+            residuals = terms.blocks.residuals[..., 0] @ np.linalg.inv(group.data.whitening).T
+            data = replace(group.data, whitening=_whitening(np.asarray(residuals, float), weight, spent))
         groups.append(replace(group, data=data))
     return replace(problem, groups=tuple(groups))
 
 
-def _whitening(residuals: Array, spent: int) -> Array:
-    """Return the matrix (6, 6) that whitens pose residuals (n, 6), of which `spent` numbers were fitted away."""
-    count = len(residuals)
-    freedom = max(count - spent / 6, 1.0)
-    least = LEAST_POSE_NOISE**2 * np.eye(6)
-    if count < 3 * 6:
-        return np.diag(1 / np.sqrt((residuals**2).sum(axis=0) / freedom + np.diag(least)))
-    return np.linalg.inv(np.linalg.cholesky(residuals.T @ residuals / freedom + least))
+def _whitening(residuals: Array, weight: Array, spent: int) -> Array:
+    """Return the matrix (6, 6) that whitens pose residuals (n, 6), of which `spent` numbers were fitted away.
+
+    Rotations and positions have a size each: more cannot be told from a few dozen poses without being misled.
+    """
+    freedom = max(int((weight > 0).sum()) - spent / 6, 1.0)
+    variance = (weight[:, None] * residuals**2).sum(axis=0) / freedom
+    sizes = np.repeat(variance.reshape(2, 3).mean(axis=1), 3)
+    return np.diag(1 / np.sqrt(sizes + LEAST_POSE_NOISE**2))
 
 
 def _reading_std(problem: Problem, there: Evaluation, weights: Weights, unknown: NDArray[np.bool_]) -> Array:

@@ -1,6 +1,7 @@
 """`activecam solve`: from a session to a calibration."""
 
 import json
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +9,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from calib import Calibration, Session, load_session, save_calibration
+from calib import Calibration, load_session, save_calibration
+from calib.session_writer import keep_origin
 from daemon.cli.console import output, progress_line, warn
 
 
@@ -42,7 +44,9 @@ def solve(
     with progress_line() as progress:
         calibration = solve_session(loaded, method.value, progress)
     save_calibration(calibration, result)
-    _keep_origin(loaded, calibration)
+    # A session that cannot be written to is solved all the same.
+    with suppress(OSError):
+        keep_origin(loaded, calibration.origin if len(calibration.joints) == len(loaded.joints) else None)
     for warning in calibration.quality.warnings:
         warn(warning)
     if as_json:
@@ -50,25 +54,6 @@ def solve(
         return
     print_calibration(calibration)
     output.print(f"Calibration written to {result}", soft_wrap=True)
-
-
-def _keep_origin(session: Session, calibration: Calibration) -> None:
-    """Store in the session which way round its symmetric target was taken, so that it stays that way.
-
-    A session that cannot be written to is solved all the same.
-    """
-    from calib.documents import write_json
-
-    if (
-        session.origin is not None
-        or calibration.origin is None
-        or len(calibration.joints) < len(session.joints)
-    ):
-        return
-    try:
-        write_json(session.folder / "session.json", session.model_copy(update={"origin": calibration.origin}))
-    except OSError:
-        return
 
 
 def print_calibration(calibration: Calibration) -> None:

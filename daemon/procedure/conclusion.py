@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from calib import Calibration, load_session
+from calib.session_writer import keep_origin
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Solved, Solving, Verified
 
@@ -46,7 +47,10 @@ async def conclude(folder: Path, log: EventLog) -> Conclusion:
 def _solve(folder: Path, tell: Callable[[str], None]) -> Calibration:
     from calib import solve  # it brings scipy, which a daemon that only serves poses does without
 
-    return solve(load_session(folder), progress=tell)
+    session = load_session(folder)
+    calibration = solve(session, progress=tell)
+    keep_origin(session, calibration.origin)
+    return calibration
 
 
 def _verify(calibration: Calibration, folder: Path) -> dict[str, Any] | None:

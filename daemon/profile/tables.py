@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchem
 from calib.session import Intrinsics
 from daemon.profile.targets import TargetTable
 from drivers.axis import JointKind
-from drivers.quantities import NUMBER, Duration, PositiveDuration
+from drivers.quantities import NUMBER, Duration, PositiveDuration, written
 from drivers.simulated.options import SimulationOptions
 
 PROFILE_FORMAT = "activecam.profile/1"
@@ -130,8 +130,8 @@ class ProcedureTable(Table):
     """The pictures that a calibration takes."""
 
     settle: Annotated[Duration, Field(ge=0, description="Wait after standstill, before an exposure.")]
-    max_reading_age: Annotated[PositiveDuration, Field(description="Older readings give no pose.")] = 1.0
-    frame_timeout: PositiveDuration = 5.0
+    max_reading_age: Annotated[PositiveDuration, Field(description="Older readings give no pose.")] = written("1 s")
+    frame_timeout: PositiveDuration = written("5 s")
     sweeps: list[SweepTable] = []
     views: list[ViewTable] = []
 
