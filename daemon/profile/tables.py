@@ -130,7 +130,9 @@ class ProcedureTable(Table):
     """The pictures that a calibration takes."""
 
     settle: Annotated[Duration, Field(ge=0, description="Wait after standstill, before an exposure.")]
-    max_reading_age: Annotated[PositiveDuration, Field(description="Older readings give no pose.")] = written("1 s")
+    max_reading_age: Annotated[PositiveDuration, Field(description="Older readings give no pose.")] = written(
+        "1 s"
+    )
     frame_timeout: PositiveDuration = written("5 s")
     sweeps: list[SweepTable] = []
     views: list[ViewTable] = []
