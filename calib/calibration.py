@@ -90,13 +90,22 @@ class ViewQuality(Document):
     rms_px: Number | None = None
     position_m: Number | None = None
     rotation_rad: Number | None = None
+    held_out_px: Number | None = None
+    """Its rms error against the fit of all other views."""
 
 
 class Quality(Document):
-    """Residuals of fit and held-out views (px, rms over points), view by view, and warnings in words."""
+    """Residuals of fit and held-out views (px, rms over points), view by view, and warnings in words.
+
+    The held-out figures are the verdict: mean position (m) and rotation (rad) where the views carry given poses.
+    """
 
     rms_px: Number | None = None
     held_out_rms_px: Number | None = None
+    held_out_position_m: Number | None = None
+    held_out_rotation_rad: Number | None = None
+    held_out_by: Literal["verify", "leave_one_view_out"] | None = None
+    """By which views: those marked `verify`, or each by the fit of all others."""
     views: list[ViewQuality] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)
 

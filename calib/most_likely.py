@@ -35,6 +35,7 @@ def most_likely(session: Session, observations: Sequence[Observation], start: So
         lenses=refined.lenses(),
         covariance=_document_covariance(session, refined),
         left_out=(aside.views, aside.points),
+        held_out=refined.held_out,
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import Chain
+from calib.likelihood.held_out import HeldOut
 from calib.session import Intrinsics, WorldOrigin
 
 Array = NDArray[np.float64]
@@ -17,7 +18,8 @@ class Solution:
     """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens; None where there is none.
 
     `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
-    their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong.
+    their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
+    well each view is predicted by the fit of all others.
     """
 
     chain: Chain
@@ -26,3 +28,4 @@ class Solution:
     origin: WorldOrigin | None = None
     covariance: tuple[list[str], Array] | None = None
     left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
+    held_out: Sequence[HeldOut] = ()

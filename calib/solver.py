@@ -43,5 +43,5 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
         warnings += lens_in_words(camera.name, std)
     warnings += [*left_out_in_words(solution), *observed.missing]
     calibration = document(session, method, solution, Quality())
-    quality = judged(calibration, session, observed.observations, warnings)
+    quality = judged(calibration, session, observed.observations, solution.held_out, warnings)
     return calibration.model_copy(update={"quality": quality})

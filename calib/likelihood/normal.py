@@ -39,7 +39,7 @@ def normal_equations(problem: Problem, estimate: Estimate, evaluation: Evaluatio
     eliminations = []
     for group, terms in zip(problem.groups, evaluation.terms, strict=True):
         local = local_by_parameter(problem, group, terms)
-        hessian, slope, elimination = _without_reading_errors(problem, estimate, group, terms, local)
+        hessian, slope, elimination = without_reading_errors(problem, estimate, group, terms, local)
         information += np.einsum("ndp,nde,neq->pq", local, hessian, local, optimize=True)
         gradient += np.einsum("ndp,nd->p", local, slope)
         eliminations.append(elimination)
@@ -66,7 +66,7 @@ def local_by_parameter(problem: Problem, group: Group, terms: GroupTerms) -> Arr
     return local
 
 
-def _without_reading_errors(
+def without_reading_errors(
     problem: Problem, estimate: Estimate, group: Group, terms: GroupTerms, local: Array
 ) -> tuple[Array, Array, Elimination]:
     """Return hessian (n, d, d) and gradient (n, d) with each view's reading errors at their best (Schur)."""

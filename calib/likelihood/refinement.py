@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from calib.chain import Chain
 from calib.closed_form import PoseViews
 from calib.likelihood.descent import Descent, descend
+from calib.likelihood.held_out import HeldOut, held_out
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector
 from calib.likelihood.measurements import GivenPoses, PointViews, point_views
 from calib.likelihood.outliers import Misfits, SetAside, judged, misfits, point_noise, softened
@@ -54,7 +55,7 @@ class Refined:
     """The most likely calibration.
 
     `covariance` (p, p) is of a step of `problem.layout`'s parameters, `noise` the standard deviation of one
-    measurement in units of what it was taken for, `reading_std` (m,) those of the readings.
+    measurement in units of what it was taken for, `held_out` how well each view is predicted by the others.
     """
 
     problem: Problem
@@ -63,6 +64,7 @@ class Refined:
     covariance: Array
     noise: float
     set_aside: SetAside
+    held_out: list[HeldOut]
 
     @property
     def state(self) -> State:
@@ -93,7 +95,16 @@ def refine(session: Session, observations: Sequence[Observation], start: Start) 
         aside = newly
     noise = noise_variance(problem, descent, weights)
     covariance = step_covariance(problem, descent, noise)
-    return Refined(problem, weights, descent, covariance, float(np.sqrt(noise)), aside)
+    as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
+    predicted = held_out(
+        problem,
+        estimate,
+        weights,
+        descent.evaluation,
+        evaluate(problem, as_read, weights, offsets_at(problem, as_read)),
+        descent.equations.information,
+    )
+    return Refined(problem, weights, descent, covariance, float(np.sqrt(noise)), aside, predicted)
 
 
 def _problem(session: Session, observations: Sequence[Observation], start: Start) -> tuple[Problem, Estimate]:

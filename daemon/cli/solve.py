@@ -85,7 +85,17 @@ def print_calibration(calibration: Calibration) -> None:
     quality = calibration.quality
     if quality.rms_px is not None:
         output.print(
-            f"Residual of the fit: {quality.rms_px:.3f} px rms (small residuals alone do not say good)"
+            f"Residual of the fit: {quality.rms_px:.3f} px rms (a small one alone does not say good)"
         )
-    if quality.held_out_rms_px is not None:
-        output.print(f"Prediction of held-out views: {quality.held_out_rms_px:.3f} px rms")
+    verdict = [
+        text.format(factor * value)
+        for value, factor, text in (
+            (quality.held_out_rms_px, 1, "{:.3f} px rms"),
+            (quality.held_out_position_m, 1e3, "{:.3f} mm"),
+            (quality.held_out_rotation_rad, 1e3, "{:.3f} mrad"),
+        )
+        if value is not None
+    ]
+    if verdict:
+        by = "held-out views" if quality.held_out_by == "verify" else "each view by all others"
+        output.print(f"Prediction of {by}: {', '.join(verdict)}")

@@ -140,3 +140,22 @@ def test_known_intrinsics_stay_as_they_are() -> None:
     assert kept is not None
     assert kept.fx == known.fx
     assert kept.distortion == known.distortion
+
+
+def test_leaving_a_view_out_by_the_jacobian_is_leaving_it_out() -> None:
+    """The held-out error of a view equals that against an actual fit without it."""
+    _, session = rig_and_session(5)
+    whole = most_likely(5)
+    assert whole.quality.held_out_by == "leave_one_view_out"
+    for left_out in (0, 9, 17):
+        views = [
+            view.model_copy(update={"use": "verify"}) if index == left_out else view
+            for index, view in enumerate(session.views)
+        ]
+        without = solve(session.with_views(views)).quality
+        assert without.held_out_by == "verify"
+        stated = next(view.held_out_px for view in whole.quality.views if view.view == left_out)
+        assert stated == pytest.approx(without.held_out_rms_px, rel=0.02)
+    assert whole.quality.held_out_rms_px is not None
+    assert whole.quality.rms_px is not None
+    assert whole.quality.held_out_rms_px > whole.quality.rms_px
