@@ -39,6 +39,21 @@ class AxisSpec:
                 f"its limits are {low:g} to {high:g} {self.unit}; choose a target between them"
             )
 
+    def check_jog(self, distance: float, position: float | None) -> None:
+        """Raise LimitError unless a jog from `position` ends within the limits.
+
+        Where the position is not known (None), no jog may be longer than the whole travel.
+        """
+        if position is not None:
+            self.check_target(position + distance)
+            return
+        low, high = self.limits
+        if not abs(distance) <= high - low:
+            raise LimitError(
+                f"axis '{self.name}' cannot jog by {distance:g} {self.unit}: "
+                f"its whole travel is {high - low:g} {self.unit}; choose a shorter distance, or home it first"
+            )
+
 
 @dataclass(frozen=True, slots=True)
 class AxisState:

@@ -113,7 +113,7 @@ class ControllerOwner(DeviceOwner):
             await asyncio.wait(motions)
         self.poll_soon()
         return {
-            name: str(result)
+            name: str(result) if isinstance(result, DriverError) else f"axis '{name}': {result!r}"
             for name, result in zip(names, results, strict=True)
             if isinstance(result, Exception)
         }

@@ -108,10 +108,8 @@ class Rig:
     def check_jog(self, name: str, distance: float) -> None:
         """Raise what `jog` would raise before anything moves."""
         self._require_known(name)
-        spec = self.specs[name]
         axis = self.snapshot.axis(name)
-        if axis.homed and axis.position is not None:
-            spec.check_target(axis.position + distance)
+        self.specs[name].check_jog(distance, axis.position if axis.homed else None)
         self._require_ready([name])
 
     async def move(self, targets: Mapping[str, float]) -> None:
@@ -218,7 +216,8 @@ class Rig:
     async def _stop_axes(self, names: Sequence[str]) -> None:
         groups = [(owner, [name for name in owner.axes if name in names]) for owner in self._controllers]
         answers = await asyncio.gather(*(owner.stop(axes) for owner, axes in groups if axes))
-        unconfirmed = [f"axis '{name}': {reason}" for answer in answers for name, reason in answer.items()]
+        # Axes of one device often have one reason; a driver's names its axis itself.
+        unconfirmed = list(dict.fromkeys(reason for answer in answers for reason in answer.values()))
         if unconfirmed:
             raise StandstillError(
                 f"a stop was sent, but a standstill could not be confirmed: {'; '.join(unconfirmed)}; "

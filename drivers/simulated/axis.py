@@ -13,7 +13,6 @@ from drivers.errors import (
     AxisBusyError,
     DeviceTimeoutError,
     DriverError,
-    LimitError,
     MotionError,
     MotionStoppedError,
 )
@@ -87,13 +86,10 @@ class SimulatedAxis:
 
     async def jog(self, distance: float) -> None:
         """Move by `distance`, homed or not; see `drivers.axis.Axis`."""
-        if not math.isfinite(distance):
-            raise LimitError(f"axis '{self._spec.name}' cannot jog by {distance}: give a finite distance")
         state = await self.read()
         self._device.require_no_alarm(self._spec.name)
         self._require_idle()
-        if state.position is not None:
-            self._spec.check_target(state.position + distance)
+        self._spec.check_jog(distance, state.position)
         await self._carry_out(self._shaft.motor(self._clock.now()) + distance, self._spec.velocity)
 
     async def stop(self) -> None:

@@ -50,6 +50,18 @@ async def test_an_unhomed_axis_keeps_all_others_from_moving(rig: Rig) -> None:
     assert rig.axis("slide").position == 0.0
 
 
+async def test_an_unhomed_axis_jogs_by_no_more_than_its_travel(rig: Rig) -> None:
+    await rig.home("pan")
+    with pytest.raises(LimitError, match=r"'slide' cannot jog by -100\.1 mm: its whole travel is 100 mm"):
+        await rig.jog("slide", -100.1)
+    with pytest.raises(LimitError, match="'slide' cannot jog by 1e"):
+        await rig.jog("slide", 1e308)
+    with pytest.raises(LimitError, match=r"'pan' cannot go to 20\.1 deg"):
+        await rig.jog("pan", 20.1)
+    assert not rig.snapshot.moving
+    await rig.jog("slide", 10.0)
+
+
 async def test_one_target_beyond_its_limits_keeps_all_axes_from_moving(rig: Rig) -> None:
     await home_all(rig)
     with pytest.raises(LimitError, match="'pan' cannot go to 21 deg"):
