@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import threading
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from calib import Calibration, load_session
 from calib.session_writer import keep_origin
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Solved, Solving, Verified
+from daemon.procedure.worker import in_worker
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,20 +30,29 @@ class Conclusion:
 async def conclude(folder: Path, log: EventLog) -> Conclusion:
     """Solve the session in `folder` and verify the result, in a worker thread.
 
-    Raises CalibError in a sentence. A solver that is abandoned by a cancellation ends in its thread, unheard.
+    Raises CalibError in a sentence. A solver that is abandoned by a cancellation ends with its next message.
     """
-    loop = asyncio.get_running_loop()
+    loop, abandoned = asyncio.get_running_loop(), threading.Event()
 
     def tell(message: str) -> None:
+        if abandoned.is_set():
+            raise _Abandoned
         loop.call_soon_threadsafe(log.add, Solving(message=message))
 
-    calibration = await asyncio.to_thread(_solve, folder, tell)
+    try:
+        calibration = await in_worker(lambda: _solve(folder, tell))
+    finally:
+        abandoned.set()
     quality = calibration.quality.model_dump(mode="json", exclude={"views"})
     log.add(Solved(method=calibration.method, quality=quality))
-    verification = await asyncio.to_thread(_verify, calibration, folder)
+    verification = await in_worker(lambda: _verify(calibration, folder))
     if verification is not None:
         log.add(Verified(result=verification))
     return Conclusion(calibration, verification)
+
+
+class _Abandoned(Exception):  # noqa: N818  it is no error
+    """Ends a solver whose result nobody waits for."""
 
 
 def _solve(folder: Path, tell: Callable[[str], None]) -> Calibration:

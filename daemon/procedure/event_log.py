@@ -53,10 +53,11 @@ class EventLog:
 def read_events(folder: Path) -> list[RunEvent]:
     """Return the events of a run that is over, from its session's folder, up to a line cut off by a crash."""
     try:
-        lines = (folder / FILE_NAME).read_text(encoding="utf-8").splitlines()
+        # Bytes: a crash may cut a letter in two, and a line of text may hold more than one kind of line end.
+        lines = (folder / FILE_NAME).read_bytes().split(b"\n")
     except FileNotFoundError:
         return []
-    events = []
+    events: list[RunEvent] = []
     for line in lines:
         try:
             events.append(EVENT.validate_json(line))

@@ -9,7 +9,7 @@ from calib import Calibration
 from daemon.errors import RigFaultError, RunActiveError, RunStateError
 from daemon.lease import LeaseDesk
 from daemon.procedure.event_log import read_events
-from daemon.procedure.events import RunEvent
+from daemon.procedure.events import Finished, RunEvent
 from daemon.procedure.run import Run
 from daemon.profile_document import ProfileDocument
 from daemon.rig import Rig
@@ -32,6 +32,7 @@ class RunManager:
         self._latest: Run | None = None
         self._starting = asyncio.Lock()
         self._closed = False
+        rig.latch.on_engage(self._stop)
 
     @property
     def active(self) -> Run | None:
@@ -87,7 +88,9 @@ class RunManager:
 
     async def list(self) -> Sequence[RunRecord]:
         """Return all runs, the newest first."""
-        return await self._store.runs()
+        # The store may not have taken the latest's end, which only its own record tells then.
+        latest = None if self._latest is None else self._latest.record
+        return [latest if latest and latest.id == run.id else run for run in await self._store.runs()]
 
     async def events(self, run_id: str, after: int = 0) -> AsyncIterator[RunEvent]:
         """Yield a run's events whose sequence is greater than `after`, and follow it to its end.
@@ -99,7 +102,10 @@ class RunManager:
                 yield event
             return
         record = await self._store.run(run_id)
-        for event in await asyncio.to_thread(read_events, self._store.session_folder(record)):
+        events = await asyncio.to_thread(read_events, self._store.session_folder(record))
+        if not events or events[-1].type != "finished":
+            events.append(_missing_end(record, len(events) + 1))
+        for event in events:
             if event.sequence > after:
                 yield event
 
@@ -111,6 +117,12 @@ class RunManager:
                 RunState.INTERRUPTED,
                 "the daemon was shut down: the views taken so far can be solved as they are",
             )
+
+    def _stop(self, reason: str) -> None:
+        # Whatever it is doing: a run that only found out at its next motion would go on once the stop is
+        # acknowledged.
+        if self.active is not None:
+            self.active.break_off(RunState.FAILED, f"a stop ended it: {reason}")
 
     def _require_able(self) -> None:
         if self._closed:
@@ -151,3 +163,15 @@ class RunManager:
             self._leases.release(token)
 
         return end
+
+
+def _missing_end(record: RunRecord, sequence: int) -> Finished:
+    """Return the last event of a run whose daemon was killed before it could tell it."""
+    return Finished(
+        run_id=record.id,
+        sequence=sequence,
+        time=record.ended_at or record.created_at,
+        state=record.state,
+        error=record.error,
+        calibration_id=record.calibration_id,
+    )

@@ -11,7 +11,7 @@ from calib.errors import DetectionError
 from daemon.procedure.approach import Approach, Side
 from daemon.rig import Rig, RigSnapshot
 from drivers.camera import Frame
-from drivers.errors import MotionError
+from drivers.errors import DeviceFaultError, MotionError
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +87,18 @@ class Observer:
         )
 
     async def _standing(self) -> RigSnapshot:
-        """Return a fresh snapshot in which every axis knows where it is, and stands; raises MotionError."""
+        """Return a fresh snapshot in which every axis knows where it is, and stands.
+
+        Raises MotionError, DeviceFaultError and DeviceLostError.
+        """
         snapshot = await self._rig.fresh_snapshot(self._rig.clock.now())
         for axis in snapshot.axes:
             if axis.moving:
                 raise MotionError(
                     f"axis '{axis.spec.name}' moves when it should stand: find out who moves it"
                 )
+            if axis.fault is not None:
+                raise DeviceFaultError(f"axis '{axis.spec.name}' is in fault: {axis.fault}")
             if axis.position is None:
                 raise MotionError(f"axis '{axis.spec.name}' no longer knows where it is: home it")
         return snapshot

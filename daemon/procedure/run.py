@@ -42,9 +42,9 @@ class Run:
         self._store = store
         self._on_end = on_end
         self._gate = Gate()
-        self._ending = RunState.CANCELLED, "it was cancelled"
+        self._ending: tuple[RunState, str] | None = None
         self._task: asyncio.Task[None] | None = None
-        self._begun = asyncio.Event()
+        self._begun = False
 
     def start(self) -> asyncio.Task[None]:
         """Begin; the task ends with the run and never fails."""
@@ -63,23 +63,29 @@ class Run:
             raise RunStateError(f"run '{self.record.id}' is not paused")
         self._gate.open()
 
-    async def end(self, state: RunState, why: str) -> None:
-        """Stop the run for good and return when its axes stand and its end is stored."""
-        if self._task is None or self._task.done():
+    def break_off(self, state: RunState, why: str) -> None:
+        """Stop the run for good, whatever it is doing; the first to ask says how it ends."""
+        if self._ending is not None or self._task is None:
             return
         self._ending = state, why
         # A task that is cancelled before its first step would never come to its end's duties.
-        await self._begun.wait()
-        self._task.cancel()
-        await asyncio.wait([self._task])
+        if self._begun:
+            self._task.cancel()
+
+    async def end(self, state: RunState, why: str) -> None:
+        """Break the run off, and return when its axes stand and its end is stored."""
+        self.break_off(state, why)
+        if self._task is not None:
+            await asyncio.wait([self._task])
 
     async def _execute(self) -> None:
-        self._begun.set()
+        self._begun = True
         state, error, conclusion = RunState.SUCCEEDED, None, None
         try:
-            conclusion = await self._work()
+            if self._ending is None:
+                conclusion = await self._work()
         except asyncio.CancelledError:
-            state, error = self._ending
+            state, error = RunState.CANCELLED, "it was cancelled"
         except (DaemonError, DriverError, CalibError) as failure:
             state, error = RunState.FAILED, str(failure)
         except OSError as failure:
@@ -87,12 +93,17 @@ class Run:
         except Exception as failure:
             logger.exception("run '%s' failed", self.record.id)
             state, error = RunState.FAILED, f"an error in the program, which its log describes: {failure!r}"
+        if conclusion is None and self._ending is not None:
+            # Whatever it was that the breaking off made go wrong.
+            state, error = self._ending
         await finish(self._conclude(state, error, conclusion))
 
     async def _work(self) -> Conclusion:
         empty = self._rig.profile.empty_session()
         writer = await finish(asyncio.to_thread(SessionWriter, self.folder, empty))
         self.log.add(StateChanged(state=RunState.RUNNING))
+        # What the starter had in motion ended with the lease that was handed over, and may still be braking.
+        await self._rig.stop_axes(list(self._rig.specs))
         await Survey(self._rig, writer, self.log, self._checkpoint).take()
         return await conclude(self.folder, self.log)
 
@@ -119,8 +130,8 @@ class Run:
             kept = None if conclusion is None else await self._keep(conclusion)
             self.record = await self._store.change_run(self.record.id, state, error, calibration=kept)
         except (DaemonError, OSError) as failure:
-            logger.exception("the end of run '%s' could not be stored", self.record.id)
-            kept, error = None, f"its end could not be stored: {failure}"
+            unstored = f"its end could not be stored: {failure}"
+            kept, error = None, unstored if error is None else f"{error}; {unstored}"
             self.record = replace(self.record, state=RunState.FAILED, error=error, ended_at=datetime.now(UTC))
         if error is not None:
             logger.warning("run '%s' %s: %s", self.record.id, self.record.state, error)

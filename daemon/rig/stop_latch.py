@@ -1,5 +1,6 @@
 """The latch of the stop: once engaged, nothing moves before a person has said that they know."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 
 from daemon.errors import StopLatchedError
@@ -11,16 +12,23 @@ class StopLatch:
     def __init__(self) -> None:
         self.reason: str | None = None
         self.since: datetime | None = None
+        self._listeners: list[Callable[[str], None]] = []
 
     @property
     def engaged(self) -> bool:
         """Whether a stop waits to be acknowledged."""
         return self.reason is not None
 
+    def on_engage(self, listener: Callable[[str], None]) -> None:
+        """Call `listener` with the reason of each stop."""
+        self._listeners.append(listener)
+
     def engage(self, reason: str) -> None:
         """Refuse all motion from now on; the first reason stays until it is acknowledged."""
         if self.reason is None:
             self.reason, self.since = reason, datetime.now(UTC)
+        for listener in self._listeners:
+            listener(reason)
 
     def acknowledge(self) -> None:
         """Allow motion again."""

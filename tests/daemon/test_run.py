@@ -1,6 +1,8 @@
 """A whole run in process, and the ways in which it ends before its time."""
 
+import asyncio
 import json
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -14,9 +16,17 @@ from calib import load_calibration, load_session
 from calib.detection import Detection, detect
 from calib.errors import DetectionError, UnsolvableError
 from calib.targets import Target
-from daemon.errors import LeaseHeldError, RigFaultError, RunActiveError, RunStateError, StopLatchedError
+from daemon.errors import (
+    LeaseHeldError,
+    RigFaultError,
+    RunActiveError,
+    RunStateError,
+    StopLatchedError,
+    StoreError,
+)
 from daemon.procedure import RunEvent
 from daemon.procedure.event_log import read_events
+from daemon.procedure.events import Warned
 from daemon.profile import Profile
 from daemon.rig import Devices
 from daemon.service import Service, running_service
@@ -152,6 +162,62 @@ async def test_a_stop_fails_the_run_and_leaves_its_views(service: Service) -> No
     assert service.poses.calibration_id is None
 
 
+@pytest.mark.parametrize("during", ["homing", "moving", "settling", "paused", "solving"])
+async def test_a_stop_ends_a_run_for_good_even_if_it_is_acknowledged_at_once(
+    service: Service, during: str
+) -> None:
+    run = await service.runs.start()
+    async for event in service.runs.events(run.id):
+        if during == "paused" and event.type == "homing" and event.axis == "slide":
+            service.runs.pause(run.id)
+        phase = event.state.value if event.type == "state" else event.type
+        if phase != ("moving" if during == "settling" else during):
+            continue
+        if during == "settling":
+            await until(service.rig, lambda snapshot: snapshot.moving)
+            await until(service.rig, lambda snapshot: not snapshot.moving)
+        await service.rig.stop("somebody pressed the button")
+        service.rig.acknowledge_stop()
+        break
+    assert (await service.runs.wait(run.id)).state is RunState.FAILED
+    run = await service.runs.get(run.id)
+    assert run.error == "a stop ended it: somebody pressed the button"
+    assert service.leases.current is None
+    readings = service.rig.snapshot.readings
+    assert (await service.rig.fresh_snapshot(service.rig.clock.now())).readings == readings
+
+
+async def test_a_stop_right_after_the_start_ends_the_run(service: Service) -> None:
+    run = await service.runs.start()
+    await service.rig.stop("somebody pressed the button")
+    assert (await service.runs.wait(run.id)).error == "a stop ended it: somebody pressed the button"
+    assert service.rig.snapshot.readings == (None, None)
+
+
+async def test_an_alarm_while_the_axes_stand_fails_the_run_in_its_words(
+    service: Service, devices: Devices
+) -> None:
+    run = await service.runs.start()
+    async for event in service.runs.events(run.id):
+        if event.type == "moving":
+            await until(service.rig, lambda snapshot: snapshot.moving)
+            await until(service.rig, lambda snapshot: not snapshot.moving)
+            cast(SimulatedController, devices.controllers["head"]).inject("alarm")
+            break
+    run = await service.runs.wait(run.id)
+    assert run.error is not None
+    assert "axis 'pan' is in fault: the controller is in alarm" in run.error
+
+
+async def test_a_run_waits_until_what_its_starter_has_moved_stands(service: Service) -> None:
+    lease = service.leases.acquire("anna", "", 60)
+    jog = service.motions.start(lease, service.rig.jog("slide", 90.0))
+    await until(service.rig, lambda snapshot: snapshot.moving)
+    run, _ = await finish(service, await service.runs.start(token=lease.token))
+    assert (run.state, run.error) == (RunState.SUCCEEDED, None)
+    assert jog.cancelled()
+
+
 async def test_a_device_lost_in_the_middle_fails_the_run_in_its_words(
     service: Service, devices: Devices
 ) -> None:
@@ -163,6 +229,7 @@ async def test_a_device_lost_in_the_middle_fails_the_run_in_its_words(
     assert run.state is RunState.FAILED
     assert "controller" in (run.error or "")
     assert "could not be confirmed" in (run.error or "")  # nobody can say that a lost axis stands
+    assert "axis 'slide': axis 'slide'" not in (run.error or "")
 
 
 async def test_a_shutdown_interrupts_the_run(profile: Profile, tmp_path: Path) -> None:
@@ -178,6 +245,25 @@ async def test_a_shutdown_interrupts_the_run(profile: Profile, tmp_path: Path) -
         past = [event async for event in service.runs.events(run.id, after=2)]
         assert past[0].sequence == 3
         assert past[-1].type == "finished"
+
+
+async def test_the_events_of_a_killed_daemon_have_an_end_too(profile: Profile, tmp_path: Path) -> None:
+    async with running_service(profile, tmp_path / "data") as service:
+        run, events = await finish(service, await service.runs.start())
+        file = service.store.session_folder(run) / "events.jsonl"
+        whole = file.read_bytes().split(b"\n")
+        # What a kill leaves: a line cut in the middle of a letter, and a store that says "running".
+        warning = Warned(run_id=run.id, sequence=4, message="a line\u2028of two").model_dump_json()
+        file.write_bytes(b"\n".join([*whole[:3], warning.encode(), whole[4] + "é".encode()[:1]]))
+        await service.store.change_run(run.id, RunState.RUNNING)
+    async with running_service(profile, tmp_path / "data") as service:
+        past = [event async for event in service.runs.events(run.id)]
+        assert past[:3] == events[:3]
+        assert past[3].type == "warning"
+        (last,) = past[4:]
+        assert (last.type, last.sequence) == ("finished", 5)
+        assert last.state is RunState.INTERRUPTED
+        assert last.error == (await service.runs.get(run.id)).error
 
 
 class TestATargetHardToSee:
@@ -284,6 +370,48 @@ async def test_an_error_in_the_program_fails_the_run_too(
     assert "ZeroDivisionError" in (run.error or "")
     assert "Traceback" in caplog.text
     assert service.leases.current is None
+
+
+async def test_an_end_that_cannot_be_stored_is_told_with_its_cause(
+    service: Service, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def full(*_: object, **__: object) -> None:
+        raise StoreError("the database is full")
+
+    run = await service.runs.start()
+    monkeypatch.setattr(service.store, "change_run", full)
+    await service.rig.stop("a test")
+    run = await service.runs.wait(run.id)
+    assert run.state is RunState.FAILED
+    assert run.error == "a stop ended it: a test; its end could not be stored: the database is full"
+    assert await service.runs.list() == [run]
+    assert "Traceback" not in caplog.text
+
+
+async def test_a_solver_that_nobody_waits_for_holds_nothing_up(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended = threading.Event(), threading.Event()
+    go_on = threading.Event()
+
+    def solve(*_: object, progress: Callable[[str], None]) -> None:
+        progress("looking")
+        begun.set()
+        go_on.wait()
+        try:
+            progress("looking further")
+        finally:
+            ended.set()
+
+    monkeypatch.setattr("calib.solve", solve)
+    run = await service.runs.start()
+    await asyncio.to_thread(begun.wait)
+    assert (await service.runs.cancel(run.id)).state is RunState.CANCELLED
+    await asyncio.get_running_loop().shutdown_default_executor()
+    go_on.set()
+    ended.wait()
+    messages = [event.message async for event in service.runs.events(run.id) if event.type == "solving"]
+    assert messages == ["looking"]
 
 
 async def test_a_folder_that_cannot_be_made_fails_the_run(service: Service, tmp_path: Path) -> None:
