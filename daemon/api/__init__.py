@@ -3,7 +3,8 @@
 Its parts:
 
     app             all routes together
-    problems        errors as problem documents;  dependencies  what routes are given
+    guard           what no route gets to see
+    problems        errors as problem documents;  dependencies, bodies  what routes are given
     rig, lease, axes, camera, runs, calibrations, poses, pose_stream, metrics
                     routes by what they are about;  *_documents  their larger answers
     reference       all of it as a page to read

@@ -19,6 +19,7 @@ from daemon.api import (
     rig,
     runs,
 )
+from daemon.api.guard import Guard
 from daemon.service import Service
 
 PREFIX: Final = "/api/v1"
@@ -66,6 +67,7 @@ def create_app(service: Service) -> FastAPI:
     app.include_router(metrics.router)
     app.include_router(reference.router)
     problems.install(app)
+    app.add_middleware(Guard)
     _describe_problems(app)
     return app
 

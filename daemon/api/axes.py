@@ -4,8 +4,9 @@ from collections.abc import Collection, Coroutine
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
+from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import LeaseDep, ServiceDep
 from daemon.api.problems import answers
 from daemon.api.rig_documents import AxisDocument
@@ -57,19 +58,19 @@ MOTION = {
 }
 
 
-class Move(BaseModel):
+class Move(RequestBody):
     """Where to go."""
 
     target: Annotated[Reading, Field(examples=[12.5])]
 
 
-class Jog(BaseModel):
+class Jog(RequestBody):
     """How far to go from where the axis is."""
 
     distance: Annotated[Reading, Field(examples=[-0.5])]
 
 
-class CombinedMove(BaseModel):
+class CombinedMove(RequestBody):
     """Where several axes go at once."""
 
     targets: Annotated[dict[str, Reading], Field(min_length=1, examples=[{"slide": 40.0, "pan": -5.0}])]

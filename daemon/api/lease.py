@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
+from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import LeaseDep, LeaseToken, ServiceDep
 from daemon.api.problems import answers
 from daemon.errors import LeaseEndedError, LeaseHeldError, LeaseRequiredError
@@ -13,7 +14,7 @@ from daemon.errors import LeaseEndedError, LeaseHeldError, LeaseRequiredError
 router = APIRouter(prefix="/lease", tags=["lease"])
 
 
-class LeaseRequest(BaseModel):
+class LeaseRequest(RequestBody):
     """Who wants to move, what for, and for how long at most without being heard of."""
 
     owner: Annotated[str, Field(min_length=1, max_length=200, examples=["anna"])]

@@ -6,10 +6,11 @@ from typing import Annotated, Any
 import numpy as np
 from fastapi import APIRouter, Request, Response
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, Field
+from pydantic import Field
 from pydantic_core import to_json
 
 from calib.errors import ReadingsError
+from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import ServiceDep
 from daemon.api.pose_documents import Pixels, Pose, PosesAtReadings, Rays
 from daemon.api.problems import answers
@@ -40,14 +41,14 @@ SMALL = 64
 """Vectors of readings that are computed at once; more go to a worker thread, so that others need not wait."""
 
 
-class PosesRequest(BaseModel):
+class PosesRequest(RequestBody):
     """Where the camera would be."""
 
     readings: Readings
     camera: CameraName = None
 
 
-class ProjectRequest(BaseModel):
+class ProjectRequest(RequestBody):
     """World points (m) to be seen."""
 
     points: Annotated[
@@ -58,7 +59,7 @@ class ProjectRequest(BaseModel):
     camera: CameraName = None
 
 
-class RaysRequest(BaseModel):
+class RaysRequest(RequestBody):
     """Pixels to look through; (0, 0) is the centre of the top-left pixel."""
 
     pixels: Annotated[

@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problem documents: one table from the exception trees to status, code and title."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
@@ -67,6 +68,8 @@ HTTP_PROBLEMS: Final = {
     404: Kind(404, "not_found", "There is nothing at this address"),
     405: Kind(405, "method_not_allowed", "This address does not take this method"),
 }
+BODY_TOO_LARGE: Final = Kind(413, "body_too_large", "The request's body is too large")
+FOREIGN_PAGE: Final = Kind(403, "foreign_page", "A page from elsewhere may not do this")
 INTERNAL: Final = Kind(500, "internal_error", "The daemon has failed")
 
 
@@ -141,7 +144,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _answer_unexpected)
 
 
-def _respond(request: Request, kind: Kind, detail: str, headers: Any = None, **more: Any) -> Response:
+def respond(request: Request, kind: Kind, detail: str, headers: Any = None, **more: Any) -> Response:
+    """Return the answer that is a problem document."""
     content = document(kind, detail, request.url.path) | more
     return Response(to_json(content), kind.status, headers, MEDIA_TYPE)
 
@@ -150,26 +154,38 @@ async def _answer_known(request: Request, error: Exception) -> Response:
     kind = kind_of(error)
     # RFC 9110 wants a 401 to say how to be let in.
     headers = {"WWW-Authenticate": "Lease"} if kind.status == HTTPStatus.UNAUTHORIZED else None
-    return _respond(request, kind, str(error), headers)
+    return respond(request, kind, str(error), headers)
 
 
 async def _answer_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    wrong = [{"field": field_path(tuple(e["loc"])), "message": e["msg"]} for e in error.errors()]
+    wrong = [_invalid_field(e) for e in error.errors()]
+    if wrong[0]["field"] == "body" and "json" not in request.headers.get("content-type", ""):
+        # The commonest slip with curl, which says that what it sends is a form.
+        wrong = [{"field": "body", "message": "Send JSON, with the header Content-Type: application/json"}]
     more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
     detail = f"{wrong[0]['field']}: {wrong[0]['message']}{more}"
-    return _respond(request, INVALID, detail, errors=wrong)
+    return respond(request, INVALID, detail, errors=wrong)
+
+
+def _invalid_field(error: Mapping[str, Any]) -> dict[str, str]:
+    if error["type"] == "json_invalid":
+        where, why = error["loc"][-1], error["ctx"]["error"]
+        return {"field": "body", "message": f"Not JSON at character {where}: {why}"}
+    return {"field": field_path(tuple(error["loc"])), "message": error["msg"]}
 
 
 async def _answer_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    kind = HTTP_PROBLEMS.get(error.status_code)
+    kind = (
+        BODY_TOO_LARGE if error.status_code == BODY_TOO_LARGE.status else HTTP_PROBLEMS.get(error.status_code)
+    )
     if kind is None:
         phrase = HTTPStatus(error.status_code).phrase
         kind = Kind(error.status_code, phrase.lower().replace(" ", "_").replace("-", "_"), phrase)
-    return _respond(request, kind, f"{kind.title}: {request.method} {request.url.path}", error.headers)
+    return respond(request, kind, f"{kind.title}: {request.method} {request.url.path}", error.headers)
 
 
 async def _answer_unexpected(request: Request, error: Exception) -> Response:
     logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    return _respond(request, INTERNAL, "an error in the program, which its log describes: please report it")
+    return respond(request, INTERNAL, "an error in the program, which its log describes: please report it")

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Body, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 
+from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import LeaseToken, ServiceDep
 from daemon.api.problems import answers
 from daemon.errors import (
@@ -27,7 +28,7 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 RunId = Annotated[str, Path(description="The run's id.", examples=["20260314-092653-5f3a1c"])]
 
 
-class RunRequest(BaseModel):
+class RunRequest(RequestBody):
     """Who starts the run and what for; both for the record only."""
 
     owner: Annotated[str, Field(max_length=200)] = ""

@@ -108,6 +108,8 @@ async def test_what_cannot_be_is_refused(
         move, content=b'{"target": NaN}', headers=lease | {"Content-Type": "application/json"}
     )
     assert code(infinite) == (422, "invalid_request")
+    for almost in ({"target": True}, {"target": "1"}, {"target": 1, "velocity": 0.1}):
+        assert code(await client.post(move, json=almost, headers=lease)) == (422, "invalid_request")
     assert service.rig.snapshot.readings == (0.0, 0.0)
 
 

@@ -1,6 +1,6 @@
 """Errors as problem documents: every one of the trees', and those of HTTP itself."""
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 
 import httpx
 import pytest
@@ -78,6 +78,53 @@ async def test_http_has_problems_of_its_own(
     assert problem["detail"]
     if status == 405:
         assert "GET" in answer.headers["allow"]
+
+
+@pytest.mark.parametrize(
+    ("content_type", "body", "detail"),
+    [
+        ("application/x-www-form-urlencoded", b'{"owner": "anna"}', "Content-Type: application/json"),
+        ("text/plain", b'{"owner": "anna"}', "Content-Type: application/json"),
+        ("application/json", b'{"owner": ', "body: Not JSON at character 10"),
+        ("application/json", b'{"owner": "anna", "ttl": 5}', "body.ttl: Extra inputs"),
+        ("application/json", b'{"owner": "anna", "ttl_s": -1}', "body.ttl_s: "),
+        ("application/json", b'{"owner": "anna", "ttl_s": NaN}', "body.ttl_s: "),
+    ],
+)
+async def test_a_body_that_is_wrong_is_told_how(
+    client: httpx.AsyncClient, content_type: str, body: bytes, detail: str
+) -> None:
+    answer = await client.post("/lease", content=body, headers={"Content-Type": content_type})
+    assert (answer.status_code, answer.json()["code"]) == (422, "invalid_request")
+    assert detail in answer.json()["detail"]
+
+
+async def test_a_body_that_no_route_could_want_is_not_read_to_its_end(client: httpx.AsyncClient) -> None:
+    sent = 0
+
+    async def endless() -> AsyncIterator[bytes]:
+        nonlocal sent
+        while True:
+            sent += 1
+            yield b" " * 2**20
+
+    answer = await client.post("/pose", content=endless(), headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.json()["code"]) == (413, "body_too_large")
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert sent < 10
+
+
+async def test_a_page_from_elsewhere_changes_nothing_but_may_stop(
+    service: Service, client: httpx.AsyncClient
+) -> None:
+    elsewhere = {"Origin": "http://elsewhere.example"}
+    for method, address in (("POST", "/runs"), ("POST", "/stop/acknowledge"), ("DELETE", "/lease")):
+        answer = await client.request(method, address, headers=elsewhere)
+        assert (answer.status_code, answer.json()["code"]) == (403, "foreign_page")
+    assert service.runs.active is None
+    assert (await client.get("/rig", headers=elsewhere)).status_code == 200
+    assert (await client.post("/stop", headers=elsewhere)).status_code == 200
+    assert (await client.post("/stop/acknowledge", headers={"Origin": "http://rig"})).status_code == 200
 
 
 async def test_an_error_in_the_program_is_logged_and_not_shown(
