@@ -21,8 +21,8 @@ logger = logging.getLogger(__name__)
 
 DEFAULT_HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
-GRACE: Final = 5
-"""Seconds that an answer under way may still take at a shutdown."""
+GRACE: Final = 1.0
+"""Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
 
 
 class Server(uvicorn.Server):
@@ -38,6 +38,11 @@ class Server(uvicorn.Server):
         self._service.streams.close()
         self.exit_asked.set()
         super().handle_exit(sig, frame)
+
+    def hang_up(self) -> None:
+        """Drop the connections that there still are: a client that reads nothing never ends its own."""
+        for connection in list(self.server_state.connections):
+            connection.transport.abort()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None]:
@@ -68,6 +73,8 @@ def serve(
 
 def bind(host: str, port: int) -> socket.socket:
     """Return a socket bound to `host` and `port`; raises ServeError with what to do."""
+    if not 0 <= port <= 65535:
+        raise ServeError(f"cannot listen on port {port}: choose a --port between 0 and 65535")
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         # asyncio sends small answers at once (TCP_NODELAY) only on sockets that say that they are TCP.
@@ -79,11 +86,11 @@ def bind(host: str, port: int) -> socket.socket:
         listening.bind((host, port))
         # Listening already keeps a second daemon out while this one is still opening its devices.
         listening.listen(2048)
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         listening.close()
-        reason = error.strerror if isinstance(error, OSError) else "a port is between 0 and 65535"
         raise ServeError(
-            f"cannot listen on {host}, port {port}: {reason}: stop what uses it, or choose another --port"
+            f"cannot listen on {host}, port {port}: {error.strerror}: "
+            "stop what uses it, or choose another --port"
         ) from None
     return listening
 
@@ -121,7 +128,6 @@ async def serving(service: Service, listening: socket.socket) -> AsyncIterator[S
         lifespan="off",
         log_config=None,
         access_log=False,
-        timeout_graceful_shutdown=GRACE,
     )
     server = Server(config, service)
     task = asyncio.create_task(server.serve(sockets=[listening]))
@@ -132,6 +138,8 @@ async def serving(service: Service, listening: socket.socket) -> AsyncIterator[S
         server.handle_exit(signal.SIGTERM, None)
         # The axes must not go on moving while connections are drained.
         await service.halt()
+        await asyncio.wait([task], timeout=GRACE)
+        server.hang_up()
         await task
 
 

@@ -183,6 +183,23 @@ async def test_open_streams_do_not_hold_up_the_end(service: Service) -> None:
     assert service.streams.open == 0
 
 
+async def test_clients_that_read_nothing_do_not_hold_up_the_end(
+    service: Service, caplog: pytest.LogCaptureFixture
+) -> None:
+    half = b"POST /api/v1/pose HTTP/1.1\r\nHost: rig\r\nContent-Type: application/json\r\nContent-Length: 99\r\n\r\n{"
+    video = b"GET /api/v1/camera/stream.mjpg?fps=60 HTTP/1.1\r\nHost: rig\r\n\r\n"
+    with bind("127.0.0.1", 0) as listening, socket.socket() as sender, socket.socket() as viewer:
+        viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+        async with serving(service, listening) as server:
+            for client, request in ((sender, half), (viewer, video)):
+                await asyncio.to_thread(client.connect, listening.getsockname())
+                client.sendall(request)
+            while not (service.streams.open and len(server.server_state.tasks) == 2):
+                await service.rig.changed.wait()
+    assert not service.streams.open
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
 async def test_answers_are_not_held_back() -> None:
     """Without TCP_NODELAY, an answer's body waits some 40 ms for the client to acknowledge its head."""
     found: list[int] = []
@@ -212,8 +229,9 @@ def test_a_port_in_use_is_one_sentence() -> None:
             ServeError, match=f"port {port}: Address already in use: stop what uses it, or choose"
         ):
             bind("127.0.0.1", port)
-    with pytest.raises(ServeError, match="between 0 and 65535"):
-        bind("127.0.0.1", 99999)
+    for port in (99999, -1):
+        with pytest.raises(ServeError, match=f"port {port}: choose a --port between 0 and 65535"):
+            bind("127.0.0.1", port)
     with pytest.raises(ServeError, match="choose another --host"):
         bind("no such host", 0)
 
