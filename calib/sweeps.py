@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+EXACTLY = 1e-12
 SAME_START = 0.01
 """Two views belong to one sweep when their idle readings agree within this part of the joint's range."""
 
@@ -26,11 +27,24 @@ def sweep_labels(readings: Array, exercised: Ints, cameras: Ints, links: Sequenc
     for joint in range(readings.shape[1]):
         own = np.flatnonzero((exercised == joint) & (reach > joint))
         idle = np.delete(readings[own] / np.where(spans > 0, spans, 1), joint, axis=1)
-        clusters = _clusters(np.column_stack([idle, cameras[own]]), SAME_START)
-        for cluster in np.unique(clusters):
-            members = own[clusters == cluster]
-            if np.ptp(readings[members, joint]) > 0:
-                labels[members, joint] = cluster
+        labels[own, joint] = _starts(np.column_stack([idle, cameras[own]]), readings[own, joint])
+    return labels
+
+
+def _starts(idle: Array, moved: Array) -> Ints:
+    """Return for each view (n,) which start it belongs to, -1 for one that stands alone at its start.
+
+    Starts may be close to each other, and idle readings may jitter: where every view shares its idle ones exactly
+    with a view at another reading, starts are told apart exactly, else within a tolerance.
+    """
+    labels = np.zeros(len(idle), dtype=np.intp)
+    for tolerance in (EXACTLY, SAME_START):
+        labels = _clusters(idle, tolerance)
+        for label in np.unique(labels):
+            if np.ptp(moved[labels == label]) == 0:
+                labels[labels == label] = -1
+        if (labels >= 0).all():
+            break
     return labels
 
 

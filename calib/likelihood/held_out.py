@@ -16,6 +16,10 @@ from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights
 Array = NDArray[np.float64]
 
 
+DETERMINED = 1e-12
+"""Ratio of the smallest to the largest eigenvalue of the scaled information below which parameters are undetermined."""
+
+
 @dataclass(frozen=True)
 class HeldOut:
     """A view's error against the fit of the others: rms of its points (px), or of a given pose (m, rad)."""
@@ -34,7 +38,7 @@ def held_out(
     as_read: Evaluation,
     information: Array,
 ) -> list[HeldOut]:
-    """Return each view's held-out error, those set aside left out.
+    """Return each view's held-out error, but for those set aside and those without which the fit is undetermined.
 
     `there` is the fit, `as_read` the same chain with each reading as it was read: a prediction knows no better.
     `information` (p, p) is that of all views.
@@ -49,14 +53,25 @@ def held_out(
         ours = local[:, :, free]
         own = np.swapaxes(ours, 1, 2) @ hessian @ ours
         pull = (np.swapaxes(ours, 1, 2) @ slope[..., None])[..., 0]
-        others = information[np.ix_(free, free)] - own
-        steps = np.linalg.solve(others, pull[..., None])
-        moved = read.blocks.jacobian @ (ours @ steps)
+        steps, determined = _steps_without(information[np.ix_(free, free)], own, pull)
+        moved = read.blocks.jacobian @ (ours @ steps[..., None])
         for row in range(len(own)):
-            if not np.any(weight[row] > 0):
+            if not determined[row] or not np.any(weight[row] > 0):
                 continue
             errors.append(_error(group.data, row, weight[row], read.blocks.residuals[row], moved[row, :, 0]))
     return errors
+
+
+def _steps_without(information: Array, own: Array, pull: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the step (n, p) to the fit without each view, and whether the others determine it (n,)."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    others = (information - own) * np.outer(scale, scale)
+    values = np.linalg.eigvalsh(others)
+    determined = values[:, 0] > DETERMINED * values[:, -1]
+    steps = np.zeros_like(pull)
+    right = (scale * pull[determined])[..., None]
+    steps[determined] = scale * np.linalg.solve(others[determined], right)[..., 0]
+    return steps, determined
 
 
 def _error(data: PointViews | GivenPoses, row: int, weight: Array, residual: Array, moved: Array) -> HeldOut:

@@ -83,6 +83,15 @@ def test_dh_conventions(drawn: tuple[Rig, np.random.Generator]) -> None:
     assert np.allclose(np.array(calibration.world_from_base)[:3, 2], calibration.joints[0].axis, atol=1e-9)
 
 
+def test_starts_close_to_each_other_are_told_apart() -> None:
+    rng = np.random.default_rng(8)
+    rig = random_rig(rng, ["revolute", "revolute"], ["skew"])
+    steps = np.linspace(-0.6, 0.6, 7)
+    views = [("j0", np.array([step, 0.3]) / rig.scales) for step in steps]
+    views += [("j1", np.array([start, step]) / rig.scales) for start in (0.2, 0.203) for step in steps]
+    assert_predicts(solve(pose_session(rig, views), "closed_form"), rig, rng)
+
+
 def test_screws_of_a_known_rig() -> None:
     """The primary result: axis along growing readings, the point nearest the world's origin, the scale."""
     rng = np.random.default_rng(3)
