@@ -78,17 +78,19 @@ def solve_chain(session: Session, views: PoseViews) -> tuple[Chain, Array]:
 
 def _mounts(session: Session, chain: Chain, views: PoseViews) -> Array:
     """Return each camera's mean pose at all readings 0 (cameras, 4, 4) (eq 67 to 69, corrected)."""
-    mounts = np.zeros((len(views.links), 4, 4))
-    for camera, link in enumerate(views.links):
-        own = views.cameras == camera
-        if not own.any():
-            name = session.cameras[camera].name
+    for camera, known in enumerate(session.cameras):
+        if not (views.cameras == camera).any():
             raise UnsolvableError(
-                f"camera '{name}' has no view with the target in it: take some, or leave it out"
+                f"camera '{known.name}' has no view with the target in it: take some, or leave it out"
             )
-        displacement = chain.displacement(views.readings[own], link)
-        mounts[camera] = mean_transform(inverse(displacement) @ views.poses[own])
-    return mounts
+    return np.array([mean_mount(chain, views, camera) for camera in range(len(views.links))])
+
+
+def mean_mount(chain: Chain, views: PoseViews, camera: int) -> Array:
+    """Return where a camera's own views have it at all readings 0 (4, 4), on the mean."""
+    own = views.cameras == camera
+    displacement = chain.displacement(views.readings[own], views.links[camera])
+    return mean_transform(inverse(displacement) @ views.poses[own])
 
 
 def _chain(session: Session, screws: Sequence[Screw]) -> Chain:

@@ -14,7 +14,7 @@ from calib.calibration import (
     JointScrew,
     Quality,
 )
-from calib.links import Links, links_of
+from calib.links import Links, based, links_of
 from calib.session import Session
 from calib.solution import Solution
 from calib.transforms import inverse
@@ -25,6 +25,8 @@ Method = Literal["ml", "closed_form"]
 def document(session: Session, method: Method, solution: Solution, quality: Quality) -> Calibration:
     """Return the solution as a calibration document."""
     chain, links = solution.chain, links_of(solution.chain)
+    if solution.world_from_base is not None:
+        links = based(links, solution.world_from_base)
     deviations = _deviations(solution)
     ranges = session.with_views([view for view in session.views if view.use == "fit"]).readings()
     return Calibration(

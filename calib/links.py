@@ -17,6 +17,7 @@ from calib.transforms import any_normal, transform
 
 Array = NDArray[np.float64]
 
+NEARLY_THE_SAME = 0.1
 PARALLEL = 1e-10
 """Sine of the angle between two axes below which they count as parallel."""
 
@@ -67,6 +68,24 @@ def links_of(chain: Chain) -> Links:
             rows.append(_row(frames[i - 1], frames[i], foot))
         foot, previous_x = next_foot, x
     return Links(frames[0].copy(), frames, rows)
+
+
+def based(links: Links, base: Array) -> Links:
+    """Return the links with the base of a drawing (4, 4) in place of the paper's, brought onto the first axis.
+
+    Its origin moves to the nearest point of the axis, its X is made normal to it, and the first row gets offsets. A
+    base that does not stand on the first axis, within a few degrees, cannot be said in D-H: then the paper's stays.
+    """
+    first = links.world_from_link[0]
+    axis = first[:3, 2]
+    if base[:3, 2] @ axis < np.cos(NEARLY_THE_SAME):
+        return links
+    origin = first[:3, 3] + ((base[:3, 3] - first[:3, 3]) @ axis) * axis
+    x = any_normal(axis, base[:3, 0], base[:3, 1])
+    standing = transform(np.column_stack([x, np.cross(axis, x), axis]), origin)
+    row = _row(standing, first, origin)
+    offsets = DhParameters(0.0, 0.0, row.d_offset, row.theta_offset)
+    return Links(standing, links.world_from_link, [offsets, *links.rows[1:]])
 
 
 def common_normal(

@@ -22,7 +22,7 @@ def most_likely(session: Session, observations: Sequence[Observation], start: So
     """Return the most likely solution near the closed form's, with its covariance and what did not belong."""
     assert start.mounts is not None
     oriented = [_as_the_chain_has_it(session, start, observation) for observation in observations]
-    refined = refine(session, oriented, Start(start.chain, start.mounts, start.lenses))
+    refined = refine(session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior))
     state, aside = refined.state, refined.set_aside
     # A prismatic axis may lie anywhere: through cameras[0]'s centre is the convention.
     chain = state.chain

@@ -19,7 +19,8 @@ class Solution:
 
     `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
     their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
-    well each view is predicted by the fit of all others.
+    well each view is predicted by the fit of all others. `prior` (k, k) is what a nominal model knows of the chain, and
+    `world_from_base` (4, 4) its base.
     """
 
     chain: Chain
@@ -29,3 +30,5 @@ class Solution:
     covariance: tuple[list[str], Array] | None = None
     left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
     held_out: Sequence[HeldOut] = ()
+    prior: Array | None = None
+    world_from_base: Array | None = None

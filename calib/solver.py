@@ -1,14 +1,18 @@
 """From a session to a calibration."""
 
+from collections.abc import Sequence
+
 from calib.calibration import Calibration, Quality
 from calib.document import Method, document
 from calib.errors import UnsolvableError
-from calib.first_solution import camera_views, first_solution
+from calib.first_solution import CameraViews, camera_views, first_solution
 from calib.lens_calibration import lens_in_words
 from calib.most_likely import focal_std, left_out_in_words, most_likely
-from calib.observations import Progress, observe
+from calib.nominal import nominal_solution
+from calib.observations import Observation, Progress, observe
 from calib.quality import judged
 from calib.session import Session
+from calib.solution import Solution
 from calib.unfinished import finished_part
 
 
@@ -31,7 +35,7 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
             "the target was seen only in views that are held out: some must have the use 'fit'"
         )
     seen = camera_views(session, fit)
-    solution = first_solution(session, fit, seen)
+    solution = _start(session, fit, seen, method)
     lens_std = seen.focal_std
     if method == "ml" and session.joints:
         solution = most_likely(session, fit, solution)
@@ -45,3 +49,12 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
     calibration = document(session, method, solution, Quality())
     quality = judged(calibration, session, observed.observations, solution.held_out, warnings)
     return calibration.model_copy(update={"quality": quality})
+
+
+def _start(
+    session: Session, observations: Sequence[Observation], seen: CameraViews, method: Method
+) -> Solution:
+    """Return the closed form's solution, or for the fit that of a drawing where the session has one."""
+    if session.nominal is None or method == "closed_form":
+        return first_solution(session, observations, seen)
+    return nominal_solution(session, session.nominal, observations, seen)

@@ -95,4 +95,5 @@ def stepped(problem: Problem, estimate: Estimate, equations: NormalEquations, st
     for group, elimination in zip(problem.groups, equations.eliminations, strict=True):
         noisy = np.flatnonzero(problem.reading_std[: group.link] > 0)
         errors[np.ix_(elimination.views, noisy)] += elimination.offset + elimination.slope @ step
-    return replace(estimate, state=estimate.state.moved(step, problem.layout), reading_errors=errors)
+    state, travel = estimate.state.moved(step, problem.layout), estimate.travel + step
+    return replace(estimate, state=state, reading_errors=errors, travel=travel)

@@ -33,9 +33,8 @@ class NormalEquations:
 
 
 def normal_equations(problem: Problem, estimate: Estimate, evaluation: Evaluation) -> NormalEquations:
-    """Return the normal equations of all groups and priors."""
-    count = len(problem.layout)
-    information, gradient = np.zeros((count, count)), np.zeros(count)
+    """Return the normal equations of all groups and the prior."""
+    information, gradient = problem.prior.copy(), problem.prior @ estimate.travel
     eliminations = []
     for group, terms in zip(problem.groups, evaluation.terms, strict=True):
         local = local_by_parameter(problem, group, terms)
@@ -43,12 +42,6 @@ def normal_equations(problem: Problem, estimate: Estimate, evaluation: Evaluatio
         information += np.einsum("ndp,nde,neq->pq", local, hessian, local, optimize=True)
         gradient += np.einsum("ndp,nd->p", local, slope)
         eliminations.append(elimination)
-    for prior in problem.priors:
-        part = problem.layout.lenses[prior.camera]
-        lens = estimate.state.lenses[prior.camera]
-        assert lens is not None
-        information[part, part] += prior.information
-        gradient[part] += prior.information @ (lens - prior.mean)
     return NormalEquations(information, gradient, tuple(eliminations))
 
 

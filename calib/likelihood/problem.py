@@ -26,22 +26,14 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
-class Prior:
-    """What is known of the parameters beforehand: half of (x - mean)' `information` (x - mean), x numbers of a lens."""
-
-    camera: int
-    mean: Array
-    information: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Problem:
     """A session as a likelihood.
 
     `readings` (n, m) are those of all the session's views, `regressors` (n, m, k) say how much of each correction
-    is added to them, `reading_std` (m,) how noisy they are, and `noisiness` (n, m) how much of
-    that noise each has: the mean of an idle joint's readings over a sweep has less. `free` (p,) are the
-    parameters that may move. `bulges` (t, w) are the shapes of the target's warp at its points.
+    is added to them, `reading_std` (m,) how noisy they are, and `noisiness` (n, m) how much of that noise each
+    has: the mean of an idle joint's readings over a sweep has less. `free` (p,) are the parameters that may move,
+    `prior` (p, p) the information that says how far from the start. `bulges` (t, w) are the shapes of the
+    target's warp at its points.
     """
 
     layout: Layout
@@ -51,17 +43,21 @@ class Problem:
     reading_std: Array
     noisiness: Array
     free: NDArray[np.bool_]
-    priors: tuple[Prior, ...]
+    prior: Array
     disk_diameter: float | None
     bulges: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A state, and how far each view's true readings are from what was read (n, m), over their noisiness."""
+    """A state, and how far each view's true readings are from what was read (n, m), over their noisiness.
+
+    `travel` (p,) adds up the steps since the start.
+    """
 
     state: State
     reading_errors: Array
+    travel: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,11 +139,7 @@ def evaluate(
         cost += float(blocks.cost.sum())
     noisy = problem.reading_std > 0
     cost += float(((estimate.reading_errors[:, noisy] / problem.reading_std[noisy]) ** 2).sum())
-    for prior in problem.priors:
-        lens = state.lenses[prior.camera]
-        assert lens is not None
-        away = lens - prior.mean
-        cost += float(away @ prior.information @ away)
+    cost += float(estimate.travel @ problem.prior @ estimate.travel)
     return Evaluation(tuple(terms), cost if np.isfinite(cost) else np.inf)
 
 

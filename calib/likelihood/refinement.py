@@ -43,11 +43,15 @@ SETTLED = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where the fit begins: the chain, each camera's pose at readings 0 (c, 4, 4), and its lens."""
+    """Where the fit begins: the chain, each camera's pose at readings 0 (c, 4, 4), and its lens.
+
+    `prior` (k, k) is what is known of the first k parameters, those of the joints and of the first camera's mount.
+    """
 
     chain: Chain
     mounts: Array
     lenses: Sequence[Intrinsics | None]
+    prior: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +142,19 @@ def _problem(session: Session, observations: Sequence[Observation], start: Start
         noisiness=noisiness,
         reading_std=np.array([joint.reading_std or 0.0 for joint in session.joints]),
         free=free,
-        priors=(),
+        prior=_padded(start.prior, len(layout)),
         disk_diameter=disk_diameter(session.target),
         bulges=np.zeros((len(points), 0)),
     )
-    return problem, Estimate(state, np.zeros_like(readings))
+    return problem, Estimate(state, np.zeros_like(readings), np.zeros(len(layout)))
+
+
+def _padded(prior: Array | None, count: int) -> Array:
+    """Return the prior (p, p), nothing being known of the parameters that it does not reach."""
+    information = np.zeros((count, count))
+    if prior is not None:
+        information[: len(prior), : len(prior)] = prior
+    return information
 
 
 def _readings_and_noisiness(session: Session) -> tuple[Array, Array]:
