@@ -88,11 +88,15 @@ def misfits(problem: Problem, evaluation: Evaluation) -> Misfits:
     return Misfits(tuple(distances), tuple(view.left for view in freed), noise, max(noise, spread))
 
 
+def without_bad_points(problem: Problem, found: Misfits) -> Weights:
+    """Return weights with which all views count, without their bad points."""
+    return judged(problem, replace(found, spread=np.inf))[0]
+
+
 def softened(problem: Problem, found: Misfits) -> Weights:
     """Return Cauchy's weights of whole views, and no bad points: a first idea, while the chain itself is still off."""
     groups = []
-    hard, _ = judged(problem, replace(found, spread=np.inf))
-    for weight, distance in zip(hard.groups, found.distances, strict=True):
+    for weight, distance in zip(without_bad_points(problem, found).groups, found.distances, strict=True):
         soft = 1 / (1 + distance / (6 * found.spread))
         groups.append(weight * soft.reshape(-1, *[1] * (weight.ndim - 1)))
     return Weights(tuple(groups))

@@ -12,7 +12,15 @@ from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector
 from calib.likelihood.measurements import GivenPoses, PointViews, point_views
-from calib.likelihood.outliers import Misfits, SetAside, judged, misfits, point_noise, softened
+from calib.likelihood.outliers import (
+    Misfits,
+    SetAside,
+    judged,
+    misfits,
+    point_noise,
+    softened,
+    without_bad_points,
+)
 from calib.likelihood.problem import (
     Estimate,
     Evaluation,
@@ -173,15 +181,20 @@ def _readings_and_noisiness(session: Session) -> tuple[Array, Array]:
 def _approached(problem: Problem, estimate: Estimate) -> tuple[Problem, Estimate, Weights, SetAside]:
     """Return a first estimate that no outlier spoils, and what is to be set aside from there on.
 
-    Where some view looks knocked, the start may be spoilt by it and good views look knocked too: then all count a
-    little until the chain is about right. Far from it every misfit would pass for noise of readings: that is
-    asked later.
+    At the closed form good views may look knocked: with the bad points left out, a fit to all views tells whether any
+    is. If so, all count a little, from the start again, until the chain is about right. Far from it every misfit would
+    pass for noise of readings: that is asked later.
     """
     none = np.zeros(len(problem.reading_std), dtype=bool)
     problem, found, _ = _noise(problem, estimate, all_in(problem), none)
     weights, aside = judged(problem, found)
     if not aside.views:
         return problem, estimate, weights, aside
+    plain = descend(problem, estimate, without_bad_points(problem, found)).estimate
+    rescaled, found_there, _ = _noise(problem, plain, weights, none)
+    weights, aside = judged(rescaled, found_there)
+    if not aside.views:
+        return rescaled, plain, weights, aside
     for _ in range(SOFT_PASSES):
         estimate = descend(problem, estimate, softened(problem, found)).estimate
         problem, found, _ = _noise(problem, estimate, weights, none)
