@@ -4,7 +4,20 @@
     calibration = solve(session)
     calibration.world_from_camera([12.5, 30.0])     # 4 x 4
 
-`solve` and `verify` are loaded when first used: who only asks for poses does not wait for the solver.
+`solve` and `verify` are loaded when first used: who only asks for poses does not wait for the solver. The rooms, as
+data flows through them:
+
+    session, targets             what was measured, and of what;  documents, session_writer  on disk
+    detection/, observations     the target's points in every picture
+    lens, disks, tsai            lens models;  homography, bundle, lens_calibration, pose_from_view  lens and poses
+    transforms, twists, chain    rigid motions, and the chain as a product of exponentials
+    sweeps, screws, closed_form  the paper's method;  orientation  of symmetric targets;  first_solution  all of it
+    nominal, unfinished          sessions with a drawing, and sessions that were cut off
+    likelihood/, most_likely     the fit
+    links, dh, document          D-H and base read off the screws, and all written down: calibration
+    pose_covariance              how sure a pose is
+    residuals, quality, verification, paper      is it good?
+    solver                       from a session to a calibration
 """
 
 from typing import TYPE_CHECKING, Any

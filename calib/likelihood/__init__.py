@@ -1,9 +1,15 @@
-"""The maximum-likelihood fit: everything at once, from the closed form, with its uncertainty.
+"""The maximum-likelihood fit: everything at once, from a first solution, with its uncertainty.
 
-lens_terms     a pixel and its derivatives by point and lens
-parameters     what is free: names, slices, and the state they move
-chain_terms    each view's pose and its derivatives by every parameter
-measurements   what was seen, as padded arrays a view
-normal         a view's information about its pose and lens, mapped to the parameters
-descent        Levenberg and Marquardt's method on these
+    measurements         what was seen, as padded arrays a camera
+    state                what moves: the chain, the cameras on it, their lenses; and the vector of small steps
+    lens_terms           a pixel and its derivatives by point and lens
+    chain_terms          each view's pose and its derivatives by every parameter and reading
+    blocks               what each view says of its pose, lens and target
+    problem              the likelihood: measurements, what is free, what is known beforehand
+    normal               every view's information, mapped to the parameters
+    descent              Levenberg and Marquardt's way down
+    outliers             what does not belong;  reading_noise  how noisy readings are
+    refinement           all of it in turn, until nothing changes
+    uncertainty          the covariance;  document_covariance  in the document's own numbers
+    held_out             how well each view is predicted by all others
 """
