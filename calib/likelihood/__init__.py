@@ -12,4 +12,6 @@
     refinement           all of it in turn, until nothing changes
     uncertainty          the covariance;  document_covariance  in the document's own numbers
     held_out             how well each view is predicted by all others
+
+A fit starts at `refinement.refine`.
 """
