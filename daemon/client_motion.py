@@ -8,7 +8,7 @@ from typing import Any
 from daemon.errors import DaemonError
 from daemon.lease import Lease, LeaseDesk
 from daemon.rig import Rig
-from drivers.errors import DriverError, MotionStoppedError
+from drivers.errors import AxisBusyError, DriverError, MotionStoppedError
 
 logger = logging.getLogger(__name__)
 
@@ -19,23 +19,29 @@ class ClientMotions:
     def __init__(self, rig: Rig, leases: LeaseDesk) -> None:
         self._rig = rig
         self._under_way: dict[str, set[asyncio.Task[None]]] = {}
+        self._beginning: set[str] = set()
+        """Axes of motions whose first steps are still to be taken."""
         leases.on_end(self._stop)
 
-    def start(self, lease: Lease, motion: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Begin a motion that is cancelled, and so stopped, when `lease` ends."""
+    async def begin(
+        self, lease: Lease, axes: Collection[str], motion: Coroutine[Any, Any, None]
+    ) -> asyncio.Task[None]:
+        """Begin a motion of `axes` that is cancelled, and so stopped, when `lease` ends.
+
+        Returns when one of `axes` moves or the motion is over; raises what kept it from beginning.
+        """
+        for name in self._beginning.intersection(axes):
+            motion.close()
+            raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
         task = asyncio.create_task(motion)
         self._under_way.setdefault(lease.token, set()).add(task)
         task.add_done_callback(lambda done: self._finished(lease.token, done))
+        self._beginning.update(axes)
+        try:
+            await self._begun(task, axes)
+        finally:
+            self._beginning.difference_update(axes)
         return task
-
-    async def begun(self, motion: asyncio.Task[None], axes: Collection[str]) -> None:
-        """Return when one of `axes` moves or the motion is over; raises what kept it from beginning."""
-        while not motion.done() and not any(self._rig.axis(name).moving for name in axes):
-            changed = asyncio.ensure_future(self._rig.changed.wait())
-            await asyncio.wait({motion, changed}, return_when=asyncio.FIRST_COMPLETED)
-            changed.cancel()
-        if motion.done():
-            await self.ended(motion)
 
     async def ended(self, motion: asyncio.Task[None]) -> None:
         """Return when the motion has reached its target; raises what ended it before."""
@@ -43,6 +49,14 @@ class ClientMotions:
         if motion.cancelled():
             raise MotionStoppedError("the motion was stopped before its target, because its lease ended")
         motion.result()
+
+    async def _begun(self, motion: asyncio.Task[None], axes: Collection[str]) -> None:
+        while not motion.done() and not any(self._rig.axis(name).moving for name in axes):
+            changed = asyncio.ensure_future(self._rig.changed.wait())
+            await asyncio.wait({motion, changed}, return_when=asyncio.FIRST_COMPLETED)
+            changed.cancel()
+        if motion.done():
+            await self.ended(motion)
 
     async def close(self) -> None:
         """Cancel what is under way, and return when it has ended."""

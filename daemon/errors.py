@@ -28,14 +28,9 @@
 Every message is one sentence that says what happened and what to do.
 """
 
-from typing import ClassVar
-
 
 class DaemonError(Exception):
     """The daemon could not do what was asked of it."""
-
-    exit_status: ClassVar[int] = 1
-    """What the command line exits with when this ends a command."""
 
     def __str__(self) -> str:
         # KeyError quotes its message; a sentence is to be read as it is.

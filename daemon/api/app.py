@@ -33,6 +33,8 @@ points of the source frame to the target frame. Errors are RFC 9457 problem docu
 which is stable.
 
 Whatever moves carries the token of the motion lease in the header `X-Lease`; `POST /stop` needs none.
+Whatever changes something is refused to a browser's page of another address (403, `foreign_page`), but for a
+stop; a body of more than 8 MiB is refused everywhere (413, `body_too_large`).
 """
 
 TAGS: Final = [

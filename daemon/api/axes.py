@@ -140,9 +140,8 @@ async def _begin(
     *,
     wait: bool,
 ) -> None:
-    task = service.motions.start(lease, motion)
+    task = await service.motions.begin(lease, axes, motion)
     if wait:
         await service.motions.ended(task)
     else:
         response.status_code = 202
-        await service.motions.begun(task, axes)

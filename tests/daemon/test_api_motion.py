@@ -146,6 +146,17 @@ class TestASlowRig:
         assert await self.stands(moving)
         assert "stopped" in stopped.json()["last_error"]
 
+    async def test_of_motions_asked_for_at_the_same_instant_one_begins(
+        self, service: Service, client: httpx.AsyncClient, lease: dict[str, str]
+    ) -> None:
+        await home_all(service.rig)
+        asked = [
+            client.post("/axes/slide/move", json={"target": target}, headers=lease) for target in (80, 90)
+        ]
+        answers = await asyncio.gather(*asked)
+        assert sorted(answer.status_code for answer in answers) == [202, 409]
+        assert next(answer for answer in answers if answer.is_error).json()["code"] == "axis_busy"
+
     async def test_the_stop_latches_until_it_is_acknowledged(
         self, moving: Service, client: httpx.AsyncClient, lease: dict[str, str]
     ) -> None:

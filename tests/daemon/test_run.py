@@ -211,8 +211,7 @@ async def test_an_alarm_while_the_axes_stand_fails_the_run_in_its_words(
 
 async def test_a_run_waits_until_what_its_starter_has_moved_stands(service: Service) -> None:
     lease = service.leases.acquire("anna", "", 60)
-    jog = service.motions.start(lease, service.rig.jog("slide", 90.0))
-    await until(service.rig, lambda snapshot: snapshot.moving)
+    jog = await service.motions.begin(lease, ["slide"], service.rig.jog("slide", 90.0))
     run, _ = await finish(service, await service.runs.start(token=lease.token))
     assert (run.state, run.error) == (RunState.SUCCEEDED, None)
     assert jog.cancelled()
