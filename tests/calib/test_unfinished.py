@@ -29,7 +29,7 @@ def test_the_finished_joint_is_solved(count: int) -> None:
 def test_all_joints_once_they_are_begun() -> None:
     calibration = solve(cut_off(8))
     assert [joint.name for joint in calibration.joints] == ["j0", "j1"]
-    assert not calibration.quality.warnings
+    assert calibration.quality.warnings[0].startswith("the session was cut off after 8 views")
     assert np.allclose(calibration.world_from_camera(PAN[5][1]), RIG.pose(PAN[5][1]), atol=1e-8)
 
 
