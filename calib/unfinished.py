@@ -24,7 +24,10 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
     labels = sweep_labels(views.readings, views.exercised, views.cameras, views.links)
     done: Mask = np.asarray((labels >= 0).any(axis=0))
     if done.all():
-        return session, f"the session was cut off after {len(session.views)} views: its joints are known less well"
+        return (
+            session,
+            f"the session was cut off after {len(session.views)} views: its joints are known less well",
+        )
     if not done.any():
         raise UnsolvableError(
             f"the session was cut off after {len(session.views)} views, before any joint moved: "
