@@ -26,6 +26,8 @@ def read_json(path: Path) -> Any:
     except json.JSONDecodeError as error:
         cut = " (the file seems to be cut off)" if error.pos >= len(text.rstrip()) else ""
         raise FormatError(f"{path}: not JSON at line {error.lineno}: {error.msg}{cut}") from None
+    except (ValueError, RecursionError):
+        raise FormatError(f"{path}: is nested too deeply, or has a number too long, to be read") from None
 
 
 def validate(model: type[Model], data: object, what: str, fmt: str) -> Model:

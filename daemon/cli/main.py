@@ -67,6 +67,8 @@ def _run(arguments: list[str]) -> int:
             if isinstance(error, kind):
                 return _fail(sentence(error), status)
         raise
+    if status == INTERRUPTED:
+        return _fail("interrupted", INTERRUPTED)
     return status if isinstance(status, int) else 0
 
 

@@ -1,6 +1,7 @@
 """`activecam pose`: the camera's pose at given readings."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,8 +50,10 @@ def wanted_readings(readings: list[float] | None, file: Path | None, joints: lis
     vectors = [readings] if file is None else read_json(file)
     if not isinstance(vectors, list) or not all(isinstance(vector, list) for vector in vectors):
         raise ReadingsError(f"{file}: must be a JSON list of lists of readings, such as [[12.5, 30]]")
+    if not vectors:
+        raise ReadingsError(f"{file}: has no readings in it; give lists such as [[12.5, 30]]")
     for vector in vectors:
-        numbers = all(isinstance(value, int | float) and np.isfinite(value) for value in vector)
+        numbers = all(isinstance(value, int | float) and abs(value) <= sys.float_info.max for value in vector)
         if len(vector) != len(joints) or not numbers:
             raise ReadingsError(
                 f"readings {vector} are not one finite number for each of the {len(joints)} joints "

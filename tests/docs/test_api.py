@@ -86,6 +86,8 @@ def test_every_problem_is_on_the_page_with_its_status() -> None:
         *problems.HTTP_PROBLEMS.values(),
         problems.INVALID,
         problems.INTERNAL,
+        problems.BODY_TOO_LARGE,
+        problems.FOREIGN_PAGE,
     ]
     text = page(PAGE).partition("\n## Problems\n")[2]
     rows = re.findall(r"^\| `(\w+)` \| (\d+) \|", text, re.MULTILINE)
