@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.paper_rig import paper_profile, paper_world
-from calib import Calibration, Verification, load_calibration
-from calib.verification import VERIFICATION
-from daemon.procedure.events import Finished, Verified
+from calib import Calibration, Verification, load_session, solve, verify
+from calib.document import Method
+from daemon.procedure.events import Finished
 from daemon.profile import Profile
 from daemon.service import running_service
 
@@ -31,28 +31,28 @@ class Experiment:
     rotation: tuple[float, float]
 
 
-async def experiment(seed: int, *, thin: int = 1) -> Experiment:
-    """Calibrate and verify with the noise of `seed`; of each sweep only every `thin`-th position.
+METHODS: tuple[Method, ...] = ("closed_form", "ml")
 
-    Raises RuntimeError where the run does not succeed.
+
+async def experiment(seed: int, *, thin: int = 1) -> dict[Method, Experiment]:
+    """Take one run's views with the noise of `seed`, and solve and verify them by each method.
+
+    Of each sweep only every `thin`-th position is taken. Raises RuntimeError where the run does not succeed.
     """
     profile = _thinned(_seeded(paper_profile(), seed), thin)
-    verified: Verification | None = None
+    found: dict[Method, Experiment] = {}
     with TemporaryDirectory() as folder:
         async with running_service(profile, Path(folder)) as service:
             run = await service.runs.start(owner="benchmark")
             async for event in service.runs.events(run.id):
-                match event:
-                    case Verified(result=result):
-                        verified = VERIFICATION.validate_python(result)
-                    case Finished(error=str(error)):
-                        raise RuntimeError(f"the run with seed {seed} did not succeed: {error}")
-                    case _:
-                        pass
-            calibration = load_calibration(service.store.session_folder(run) / "calibration.json")
-    if verified is None:
-        raise RuntimeError(f"the run with seed {seed} was not verified: its profile holds no views out")
-    return Experiment(seed, calibration, verified, *_against_truth(profile, calibration))
+                if isinstance(event, Finished) and event.error is not None:
+                    raise RuntimeError(f"the run with seed {seed} did not succeed: {event.error}")
+            session = load_session(service.store.session_folder(run))
+            for method in METHODS:
+                calibration = solve(session, method)
+                verified = verify(calibration, session)
+                found[method] = Experiment(seed, calibration, verified, *_against_truth(profile, calibration))
+    return found
 
 
 def _seeded(profile: Profile, seed: int) -> Profile:

@@ -19,7 +19,7 @@ from benchmarks.paper_rows import (
     prediction_errors,
     travel_errors,
 )
-from benchmarks.paper_run import Experiment, experiment
+from benchmarks.paper_run import METHODS, Experiment, experiment
 from benchmarks.printing import console, say, table
 
 FIRST_SEED = 1993
@@ -28,13 +28,21 @@ OUR_COLUMNS = ("ours: mean", "min..max", "ours / paper")
 
 
 def run(*, quick: bool) -> dict[str, float]:
-    """Print the tables; return each one's mean ratio, and the errors against the truth (mm, mrad)."""
+    """Print each method's tables; return their mean ratios, and the errors against the truth (mm, mrad)."""
     seeds = range(FIRST_SEED, FIRST_SEED + (1 if quick else 5))
     runs = [asyncio.run(experiment(seed, thin=5 if quick else 1)) for seed in seeds]
+    figures: dict[str, float] = {}
+    for method in METHODS:
+        ours = _print_method([run[method] for run in runs])
+        figures |= {f"{method}, {name}": value for name, value in ours.items()}
+    return figures
+
+
+def _print_method(runs: Sequence[Experiment]) -> dict[str, float]:
+    """Print the tables of one method over all runs; return their figures."""
     found = runs[0].calibration
-    say(
-        f"{len(runs)} runs of {len(found.quality.views)} views, seeds from {seeds[0]}; method: {found.method}"
-    )
+    views, first = len(found.quality.views), runs[0].seed
+    say(f"Method '{found.method}': {len(runs)} runs of {views} views, seeds from {first}")
     figures: dict[str, float] = {}
     for given in TRAVEL_TABLES:
         figures |= _print_travel(runs, given, "encoder", against_encoder)
