@@ -47,8 +47,8 @@ def run(*, quick: bool) -> dict[str, float]:
         figures[label] = timed.ratio.median
     console.print(rows)
     say(
-        "The same points taken for centroids of disks, as detection gives them: the lens is then calibrated "
-        "three times, the last two with the centroids referred to the disks' centres."
+        "The same points taken for centroids of disks, as detection gives them: what each centroid is off by is "
+        "then predicted while the fit goes on."
     )
     _print_shares(session, repeats=pairs)
     return figures

@@ -20,12 +20,11 @@ CONVERGED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """The lens, the poses `world_from_camera` (n, 4, 4), the lens's covariance (l, l) and the residuals' rms (px)."""
+    """The lens, the poses `world_from_camera` (n, 4, 4), and the lens's covariance (l, l)."""
 
     lens: Intrinsics
     poses: Array
     covariance: Array
-    rms: float
 
 
 def adjust(
@@ -59,8 +58,7 @@ def adjust(
     covariance[np.ix_(free, free)] = variance * np.linalg.pinv(
         information[np.ix_(free, free)], hermitian=True
     )
-    rms = np.sqrt((blocks.residuals**2).sum(axis=-1)[seen.present > 0].mean())
-    return Bundle(lens_from_vector(values, lens), poses, covariance, float(rms))
+    return Bundle(lens_from_vector(values, lens), poses, covariance)
 
 
 def _blocks(seen: PointViews, poses: Array, values: Array, lens: Intrinsics, offsets: Array) -> Blocks:
