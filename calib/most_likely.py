@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.likelihood.building import Start
 from calib.likelihood.document_covariance import document_jacobian
-from calib.likelihood.refinement import Refined, Start, refine
+from calib.likelihood.refinement import Refined, refine
 from calib.observations import Observation
 from calib.residuals import read_as_predicted
 from calib.session import Session

@@ -6,9 +6,11 @@
     chain_terms          each view's pose and its derivatives by every parameter and reading
     blocks               what each view says of its pose, lens and target
     problem              the likelihood: measurements, what is free, what is known beforehand
+    building             a session as that likelihood
     normal               every view's information, mapped to the parameters
     descent              Levenberg and Marquardt's way down
-    outliers             what does not belong;  reading_noise  how noisy readings are
+    outliers             what does not belong
+    noise                how noisy points and poses are;  reading_noise  how noisy readings
     refinement           all of it in turn, until nothing changes
     uncertainty          the covariance;  document_covariance  in the document's own numbers
     held_out             how well each view is predicted by all others

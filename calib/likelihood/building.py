@@ -1,0 +1,93 @@
+"""From a session and a first solution to the likelihood, and the estimate it starts at."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.chain import Chain
+from calib.closed_form import PoseViews
+from calib.likelihood.lens_terms import lens_vector
+from calib.likelihood.measurements import GivenPoses, point_views
+from calib.likelihood.problem import Estimate, Group, Problem
+from calib.likelihood.state import Layout, State
+from calib.observations import Observation
+from calib.session import Intrinsics, Session
+from calib.sweeps import readings_at_rest, sweep_labels
+from calib.targets import disk_diameter, target_points
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where the fit begins: the chain, each camera's pose at readings 0 (c, 4, 4), and its lens.
+
+    `prior` (k, k) is what is known of the first k parameters, those of the joints and of the first camera's mount.
+    """
+
+    chain: Chain
+    mounts: Array
+    lenses: Sequence[Intrinsics | None]
+    prior: Array | None = None
+
+
+def built(session: Session, observations: Sequence[Observation], start: Start) -> tuple[Problem, Estimate]:
+    """Return the likelihood of the session's fit views, and the estimate at `start`."""
+    lenses = tuple(None if lens is None else lens_vector(lens) for lens in start.lenses)
+    state = State(start.chain, start.mounts, lenses, np.zeros(0), np.zeros(0))
+    models = [None if lens is None else lens.model for lens in start.lenses]
+    joints, cameras = [joint.name for joint in session.joints], [camera.name for camera in session.cameras]
+    layout = Layout.of(state, joints, cameras, models)
+    free = np.ones(len(layout), dtype=bool)
+    for camera, part in zip(session.cameras, layout.lenses, strict=True):
+        free[part] = camera.intrinsics is None
+    points = target_points(session.target)
+    groups: list[Group] = []
+    for index in range(len(cameras)):
+        own = [observation for observation in observations if observation.camera == index]
+        link, lens = session.camera_link(index), start.lenses[index]
+        seen = [observation for observation in own if observation.pose is None]
+        if seen:
+            groups.append(Group(index, link, lens, point_views(seen, points)))
+        given = [observation for observation in own if observation.pose is not None]
+        if given:
+            views = np.array([observation.view for observation in given], dtype=np.intp)
+            poses = np.array([observation.pose for observation in given])
+            groups.append(Group(index, link, None, GivenPoses(views, poses, np.eye(6))))
+    readings, noisiness = _readings_and_noisiness(session)
+    problem = Problem(
+        layout=layout,
+        groups=tuple(groups),
+        readings=readings,
+        regressors=np.zeros((*readings.shape, 0)),
+        noisiness=noisiness,
+        reading_std=np.array([joint.reading_std or 0.0 for joint in session.joints]),
+        free=free,
+        prior=_padded(start.prior, len(layout)),
+        disk_diameter=disk_diameter(session.target),
+        bulges=np.zeros((len(points), 0)),
+    )
+    return problem, Estimate(state, np.zeros_like(readings), np.zeros(len(layout)))
+
+
+def _padded(prior: Array | None, count: int) -> Array:
+    """Return the prior (p, p), nothing being known of the parameters that it does not reach."""
+    information = np.zeros((count, count))
+    if prior is not None:
+        information[: len(prior), : len(prior)] = prior
+    return information
+
+
+def _readings_and_noisiness(session: Session) -> tuple[Array, Array]:
+    """Return all views' readings (n, m), idle joints' averaged over their sweep, and how much noise each still has."""
+    every = PoseViews.of(session, range(len(session.views)), np.zeros((len(session.views), 4, 4)))
+    labels = sweep_labels(every.readings, every.exercised, every.cameras, every.links)
+    noisiness = np.ones_like(every.readings)
+    for joint in range(labels.shape[1]):
+        for sweep in np.unique(labels[labels[:, joint] >= 0, joint]):
+            members = labels[:, joint] == sweep
+            noisiness[members] = 1 / np.sqrt(members.sum())
+            noisiness[members, joint] = 1
+    return readings_at_rest(every.readings, labels), noisiness
