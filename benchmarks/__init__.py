@@ -7,6 +7,8 @@ an empty endpoint or of the paper from the same run, and what is timed is timed 
     paper_rig      the paper's simulated table, and a session of points as it would measure them
     solve_time, detection_time
     pose_rate      with its servers (pose_server, bare_server; server_process) and its client (http_client)
+    true_rig, random_rigs   rigs with known truth, and sessions of theirs with noise
+    efficiency     with the bound that it judges by (cramer_rao)
     paper_table    with its runs (paper_run), and the rows of both sides (paper_rows)
 
 A benchmark is a module with a docstring that says what it measures, and `run(quick)`, which prints its tables

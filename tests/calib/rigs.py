@@ -1,40 +1,15 @@
-"""Rigs with known truth, by a forward model of their own: matrix exponentials of twists."""
+"""Rigs with known truth, of any arrangement of axes, and sessions of their exact poses."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from benchmarks.true_rig import Rig, unit
 from calib.session import SESSION_FORMAT, Session
 
 ARRANGEMENTS = ["skew", "intersecting", "parallel", "coaxial", "square"]
-
-
-@dataclass(frozen=True)
-class Rig:
-    """Joints as twists per reading (m, 6) in the world at readings 0, and the camera's pose there."""
-
-    kinds: list[str]
-    axes: np.ndarray
-    points: np.ndarray
-    scales: np.ndarray
-    mount: np.ndarray
-
-    def pose(self, readings: np.ndarray) -> np.ndarray:
-        pose = np.eye(4)
-        for kind, axis, point, scale, reading in zip(
-            self.kinds, self.axes, self.points, self.scales, readings, strict=True
-        ):
-            twist = np.zeros((4, 4))
-            if kind == "revolute":
-                twist[:3, :3] = np.cross(np.eye(3), axis)
-                twist[:3, 3] = np.cross(point, axis)
-            else:
-                twist[:3, 3] = axis
-            pose = pose @ expm(twist * scale * reading)
-        return pose @ self.mount
 
 
 def random_rig(rng: np.random.Generator, kinds: list[str], arrangements: list[str]) -> Rig:
@@ -64,10 +39,6 @@ def random_rig(rng: np.random.Generator, kinds: list[str], arrangements: list[st
     mount[:3, 3] = rng.uniform(-1, 1, 3)
     scales = np.array([10 ** rng.uniform(-4, 0) for _ in kinds])
     return Rig(kinds, np.array(axes), np.array(points), scales, mount)
-
-
-def unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
 
 
 def sweep_session(

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.true_rig import Rig, unit
 from calib.session import SESSION_FORMAT, Session
-from tests.calib.rigs import Rig, unit
 
 WIDTH, HEIGHT, FOCAL = 1280, 960, 1500.0
 

@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.random_rigs import LookingRig, looking_rig, noisy_session
 from calib import Calibration, solve
 from calib.session import Session
 from calib.transforms import inverse, rotation_log
-from tests.calib.random_rigs import LookingRig, looking_rig, noisy_session
 
 RIGS = 10
 
@@ -28,7 +28,7 @@ def most_likely(seed: int) -> Calibration:
 def errors(calibration: Calibration, looking: LookingRig, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the twists from found to true poses (n, 6), and the covariances claimed for them (n, 6, 6)."""
     readings = looking.readings(np.random.default_rng(seed), 40)
-    away = inverse(calibration.world_from_camera(readings)) @ looking.poses(readings)
+    away = inverse(calibration.world_from_camera(readings)) @ looking.rig.poses(readings)
     covariance = calibration.pose_covariance(readings)
     assert covariance is not None
     return np.concatenate([rotation_log(away), away[:, :3, 3]], axis=1), covariance
@@ -51,7 +51,7 @@ def test_it_beats_the_closed_form_by_far() -> None:
     for seed in range(RIGS):
         looking, session = rig_and_session(seed)
         readings = looking.readings(np.random.default_rng(seed), 40)
-        true = looking.poses(readings)
+        true = looking.rig.poses(readings)
         miss = [
             np.linalg.norm((c.world_from_camera(readings) - true)[:, :3, 3], axis=1).mean()
             for c in (solve(session, "closed_form"), most_likely(seed))

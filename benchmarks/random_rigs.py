@@ -1,52 +1,67 @@
-"""Random rigs that look at a chessboard, with image noise: what an estimator's efficiency is measured on."""
+"""Random rigs that look at a chessboard, with image noise: what an estimator's efficiency is measured on.
 
-from dataclasses import dataclass
+Projection and motion are formulas of this file's and of `true_rig`'s own, not those of the code under test.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.true_rig import Array, Rig, unit
 from calib.session import SESSION_FORMAT, Session
-from tests.calib.rigs import Rig, unit
-from tests.calib.scenes import grid
 
 WIDTH, HEIGHT = 1280, 960
-FOCAL, CENTRE, BEND = 1500.0, (640.0, 480.0), (-0.1, 0.05)
+LENS = np.array([1500.0, 1500.0, 640.0, 480.0, -0.1, 0.05, 0.0, 0.0, 0.0])
+"""fx fy cx cy (px), then OpenCV's k1 k2 p1 p2 k3."""
 TARGET = {"kind": "chessboard", "rows": 6, "columns": 7, "pitch": 0.03}
-POINTS = grid(6, 7, 0.03)
+POINTS = np.array([[column * 0.03, row * 0.03, 0.0] for row in range(6) for column in range(7)])
+
+VIEWS = 9
+"""Of each joint."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LookingRig:
-    """A rig with the sweeps (low, high) that keep the board in the picture."""
+    """A rig with the sweeps (m, 2) of low and high readings that keep the board in the picture, and its lens."""
 
     rig: Rig
-    ranges: np.ndarray
+    ranges: Array
+    lens: Array = field(default_factory=LENS.copy)
 
-    def plan(self, views: int = 9) -> list[tuple[int, np.ndarray]]:
+    def plan(self, views: int = VIEWS) -> list[tuple[int, Array]]:
         """Return (joint, readings) of each view: every joint alone over its range, the others at 0."""
         sweeps = [(joint, np.linspace(low, high, views)) for joint, (low, high) in enumerate(self.ranges)]
         return [
             (joint, value * np.eye(len(self.ranges))[joint]) for joint, sweep in sweeps for value in sweep
         ]
 
-    def readings(self, rng: np.random.Generator, count: int) -> np.ndarray:
+    def readings(self, rng: np.random.Generator, count: int) -> Array:
         """Return readings (count, m) anywhere inside the ranges."""
         return rng.uniform(*self.ranges.T, (count, len(self.ranges)))
 
-    def poses(self, readings: np.ndarray) -> np.ndarray:
-        return np.array([self.rig.pose(at) for at in readings])
+    def pixels(self, readings: Array) -> Array:
+        """Return where the board's corners are seen (n, points, 2) at readings (n, m)."""
+        return project(self.rig.poses(readings), self.lens)
 
 
-def project(pose: np.ndarray) -> np.ndarray:
-    """Return where a camera at `pose` sees the board's corners (n, 2), by formulas of this file's own."""
-    seen = (POINTS - pose[:3, 3]) @ pose[:3, :3]
-    flat = seen[:, :2] / np.where(seen[:, 2:] > 0, seen[:, 2:], np.nan)
-    square = (flat**2).sum(axis=1, keepdims=True)
-    return FOCAL * flat * (1 + BEND[0] * square + BEND[1] * square**2) + CENTRE
+def project(poses: Array, lens: Array = LENS) -> Array:
+    """Return where cameras at `poses` (..., 4, 4) see the board's corners (..., points, 2), nan for behind."""
+    seen = (POINTS - poses[..., None, :3, 3]) @ poses[..., :3, :3]
+    x, y = np.moveaxis(seen[..., :2] / np.where(seen[..., 2:] > 0, seen[..., 2:], np.nan), -1, 0)
+    focal, centre, (k1, k2, p1, p2, k3) = lens[:2], lens[2:4], lens[4:]
+    square = x**2 + y**2
+    radial = 1 + k1 * square + k2 * square**2 + k3 * square**3
+    bent_x = x * radial + 2 * p1 * x * y + p2 * (square + 2 * x**2)
+    bent_y = y * radial + p1 * (square + 2 * y**2) + 2 * p2 * x * y
+    pixels: Array = np.stack([bent_x, bent_y], axis=-1) * focal + centre
+    return pixels
 
 
-def in_picture(pose: np.ndarray) -> bool:
+def in_picture(pose: Array) -> bool:
+    """Return whether a camera at `pose` sees the whole board."""
     pixels = project(pose)
     return bool(np.isfinite(pixels).all() and (pixels > 5).all() and (pixels < [WIDTH - 5, HEIGHT - 5]).all())
 
@@ -70,7 +85,7 @@ def looking_rig(rng: np.random.Generator, joints: int) -> LookingRig:
             return LookingRig(rig, ranges)
 
 
-def _looking_at_the_board(rng: np.random.Generator) -> np.ndarray:
+def _looking_at_the_board(rng: np.random.Generator) -> Array:
     tilt, around = np.radians(rng.uniform(20, 35)), rng.uniform(0, 2 * np.pi)
     forward = np.array([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)])
     right = unit(np.cross([0, 1, 0], forward))
@@ -92,19 +107,25 @@ def _reach(rig: Rig, joint: int, sign: int) -> float:
 
 
 def noisy_session(looking: LookingRig, rng: np.random.Generator, noise: float = 0.1, **keys: Any) -> Session:
-    """Return a session of the rig's plan with `noise` px on every coordinate."""
+    """Return a session of the rig's plan with `noise` px (std) on every coordinate."""
+    plan = looking.plan()
+    pixels = looking.pixels(np.array([at for _, at in plan]))
+    seen = [view + noise * rng.normal(size=view.shape) for view in pixels]
+    return session_of_views(looking, plan, seen, **keys)
+
+
+def session_of_views(
+    looking: LookingRig, plan: Iterable[tuple[int | None, Array]], pixels: Iterable[Array], **keys: Any
+) -> Session:
+    """Return a session whose views show the board at `pixels`, by (joint, readings) of each view in `plan`."""
+    ids = list(range(len(POINTS)))
     views = [
         {
-            "joint": f"j{joint}",
+            "joint": None if joint is None else f"j{joint}",
             "readings": at.tolist(),
-            "points": {
-                "ids": list(range(len(POINTS))),
-                "pixels": (
-                    project(looking.rig.pose(at)) + noise * rng.normal(size=(len(POINTS), 2))
-                ).tolist(),
-            },
+            "points": {"ids": ids, "pixels": seen.tolist()},
         }
-        for joint, at in looking.plan()
+        for (joint, at), seen in zip(plan, pixels, strict=True)
     ]
     units = {"revolute": "deg", "prismatic": "mm"}
     joints = [
