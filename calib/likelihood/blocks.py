@@ -50,24 +50,37 @@ def point_blocks(
     `offsets` (n, q, 2) is what centroids of disks are off by (px), `weights` (n, q) those of the points,
     `bulge` (n, q) how far the target's points lie out of its plane (m), `bulges` (n, q, w) its derivatives.
     """
-    camera_from_world = inverse(poses)[:, None]
-    rotation, normal = camera_from_world[..., :3, :3], camera_from_world[..., :3, 2]
-    points = (rotation @ seen.world[..., None])[..., 0] + camera_from_world[..., :3, 3]
-    points = points + bulge[..., None] * normal
+    camera_from_world = inverse(poses)
+    normal = camera_from_world[:, :3, 2]
+    points = camera_from_world[:, :3, :3] @ np.swapaxes(seen.world, 1, 2) + camera_from_world[:, :3, 3:]
+    points += normal[..., None] * bulge[:, None]
+    x, y, z = points = np.swapaxes(points, 0, 1)
     pixels, by_point, by_lens = pixel_terms(points, lens, model)
-    residuals = (seen.whitening @ (pixels + offsets - seen.pixels)[..., None])[..., 0]
-    by_point = seen.whitening @ by_point
     # A twist of the camera moves a point the other way: d point = point x omega - rho.
-    by_bulge = (by_point @ normal[..., None]) * bulges[..., None, :]
-    local = [by_point @ skew(points), -by_point, seen.whitening @ by_lens, by_bulge]
-    return _blocks(residuals, np.concatenate(local, axis=-1), weights[..., None])
+    by_x, by_y, by_z = by_point[:, 0], by_point[:, 1], by_point[:, 2]
+    by_turn = [by_y * z - by_z * y, by_z * x - by_x * z, by_x * y - by_y * x]
+    by_normal = (by_point * normal.T[..., None]).sum(axis=1)
+    by_bulge = [by_normal * shape for shape in np.moveaxis(bulges, -1, 0)]
+    local = [*by_turn, -by_x, -by_y, -by_z, *np.swapaxes(by_lens, 0, 1), *by_bulge]
+    root = np.sqrt(weights)
+    misfit = pixels + np.moveaxis(offsets - seen.pixels, -1, 0)
+    residuals = _whitened(seen.whitening, misfit[:, :, None])[:, 0]
+    jacobian = _whitened(seen.whitening * root[..., None, None], np.stack(local, axis=2))
+    aside = weights == 0
+    if aside.any():
+        # What is set aside may be anything, even behind the camera.
+        residuals[aside] = np.nan_to_num(residuals[aside], posinf=0, neginf=0)
+        np.swapaxes(jacobian, 1, 2)[aside] = 0
+    flat = (residuals * root[..., None]).reshape(len(poses), -1)
+    return _blocks(residuals, flat, jacobian.reshape(*jacobian.shape[:2], -1))
 
 
 def pose_blocks(given: GivenPoses, poses: Array, weights: Array) -> Blocks:
     """Return the blocks of views whose cameras are predicted at `poses` (n, 4, 4); `weights` (n,)."""
     residuals, jacobian = pose_residuals(given.poses, poses)
-    whitened = residuals @ given.whitening.T
-    return _blocks(whitened[..., None], (given.whitening @ jacobian)[..., None, :], weights[:, None, None])
+    whitened, root = residuals @ given.whitening.T, np.sqrt(weights)[:, None]
+    by_twist = np.swapaxes(given.whitening @ jacobian, 1, 2)
+    return _blocks(whitened[..., None], whitened * root, by_twist * root[..., None])
 
 
 def pose_residuals(measured: Array, predicted: Array) -> tuple[Array, Array]:
@@ -95,19 +108,21 @@ def disk_offsets(seen: PointViews, poses: Array, lens: Intrinsics, diameter: flo
     return offsets
 
 
-def _blocks(residuals: Array, local: Array, weights: Array) -> Blocks:
-    """Return the blocks of residuals (n, q, r) with derivatives (n, q, r, d), `weights` broadcast to (n, q, r)."""
-    count, root = len(residuals), np.sqrt(weights)
-    # What is set aside may be anything, even behind the camera.
-    residuals = np.where((weights > 0) | np.isfinite(residuals), residuals, 0.0)
-    local = np.where((weights > 0)[..., None] | np.isfinite(local), local, 0.0)
-    flat = (residuals * root).reshape(count, -1, 1)
-    jacobian = (local * root[..., None]).reshape(count, flat.shape[1], local.shape[-1])
-    transposed = np.swapaxes(jacobian, 1, 2)
+def _whitened(whitening: Array, rows: Array) -> Array:
+    """Return W (n, q, 2, 2) times what moves each coordinate of the points (2, n, d, q), as (n, d, q, 2)."""
+    product = np.empty((*rows.shape[1:], 2))
+    for i in range(2):
+        product[..., i] = whitening[:, None, :, i, 0] * rows[0] + whitening[:, None, :, i, 1] * rows[1]
+    return product
+
+
+def _blocks(residuals: Array, weighted: Array, transposed: Array) -> Blocks:
+    """Return the blocks of `residuals`, which are `weighted` (n, r) with derivatives (n, d, r)."""
+    jacobian = np.swapaxes(transposed, 1, 2)
     return Blocks(
         hessian=transposed @ jacobian,
-        gradient=(transposed @ flat)[..., 0],
-        cost=(flat[..., 0] ** 2).sum(axis=1),
+        gradient=(transposed @ weighted[..., None])[..., 0],
+        cost=(weighted**2).sum(axis=1),
         residuals=residuals,
         jacobian=jacobian,
     )

@@ -27,15 +27,15 @@ STEP = 1e-6
 def test_pixels_by_point_and_lens(lens: Intrinsics) -> None:
     points = np.column_stack([RNG.uniform(-0.5, 0.5, (30, 2)), RNG.uniform(1, 2, 30)])
     values = lens_vector(lens)
-    pixels, by_point, by_lens = pixel_terms(points, values, lens.model)
-    assert np.allclose(pixels, project_points(points, lens), atol=1e-12)
+    pixels, by_point, by_lens = pixel_terms(points.T, values, lens.model)
+    assert np.allclose(pixels.T, project_points(points, lens), atol=1e-12)
     for k, step in enumerate(STEP * np.eye(3)):
         difference = project_points(points + step, lens) - project_points(points - step, lens)
-        assert np.allclose(by_point[..., k], difference / (2 * STEP), rtol=1e-6, atol=1e-4)
+        assert np.allclose(by_point[:, k].T, difference / (2 * STEP), rtol=1e-6, atol=1e-4)
     for k, step in enumerate(STEP * np.eye(len(values))):
         there = project_points(points, lens_from_vector(values + step, lens))
         back = project_points(points, lens_from_vector(values - step, lens))
-        assert np.allclose(by_lens[..., k], (there - back) / (2 * STEP), rtol=1e-5, atol=1e-5)
+        assert np.allclose(by_lens[:, k].T, (there - back) / (2 * STEP), rtol=1e-5, atol=1e-5)
 
 
 def some_state() -> tuple[State, Layout, np.ndarray, np.ndarray]:
