@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 def most_likely(session: Session, observations: Sequence[Observation], start: Solution) -> Solution:
     """Return the most likely solution near the closed form's, with its covariance and what did not belong."""
     assert start.mounts is not None
-    oriented = [_as_the_chain_has_it(session, start, observation) for observation in observations]
+    oriented = _as_the_chain_has_it(session, start, observations)
     refined = refine(session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior))
     state, aside = refined.state, refined.set_aside
     # A prismatic axis may lie anywhere: through cameras[0]'s centre is the convention.
@@ -40,15 +41,19 @@ def most_likely(session: Session, observations: Sequence[Observation], start: So
     )
 
 
-def _as_the_chain_has_it(session: Session, start: Solution, observation: Observation) -> Observation:
-    """Return the observation read the way round that the closed form's chain has it."""
-    lens = start.lenses[observation.camera]
-    if observation.pose is not None or lens is None:
-        return observation
+def _as_the_chain_has_it(
+    session: Session, start: Solution, observations: Sequence[Observation]
+) -> list[Observation]:
+    """Return the observations read the way round that the closed form's chain has them."""
     assert start.mounts is not None
-    link, readings = session.camera_link(observation.camera), session.views[observation.view].readings
-    predicted = start.chain.poses(readings, link, start.mounts[observation.camera])
-    return read_as_predicted(observation, session.target, lens, predicted)[0]
+    oriented = [observation for observation in observations if observation.pose is not None]
+    for camera, lens in enumerate(start.lenses):
+        own = [o for o in observations if o.camera == camera and o.pose is None]
+        if own and lens is not None:
+            readings = [session.views[observation.view].readings for observation in own]
+            predicted = start.chain.poses(readings, session.camera_link(camera), start.mounts[camera])
+            oriented += read_as_predicted(own, session.target, lens, predicted)
+    return sorted(oriented, key=attrgetter("view"))
 
 
 def _document_covariance(session: Session, refined: Refined) -> tuple[list[str], Array]:

@@ -19,6 +19,7 @@ from calib.targets import TargetSymmetry
 from calib.transforms import pose_error
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Solved = tuple[Chain, Array]
 
 CHECKS = 3
@@ -30,13 +31,17 @@ def carried_on(views: PoseViews, symmetries: Sequence[TargetSymmetry], turnable:
 
     Views that are not `turnable` (n,) stay as they are: another system gave their poses.
     """
-    poses = views.poses.copy()
+    ways = _ways_round(views.poses, symmetries)
+    chosen = np.zeros(len(views.poses), dtype=np.intp)
     for camera in range(len(views.links)):
         own = np.flatnonzero(views.cameras == camera)
-        for parent, child in _nearest_first(views.readings[own]):
-            if turnable[own[child]]:
-                poses[own[child]] = _nearest(poses[own[parent]], poses[own[child]], symmetries)
-    return poses
+        parents, children = own[_nearest_first(views.readings[own])].T
+        # For each way round of the parent the child's nearest, and its own where it may not be turned.
+        nearest = np.array([_nearest(way[parents], ways[:, children]) for way in ways])
+        nearest[:, ~turnable[children]] = 0
+        for step, (parent, child) in enumerate(zip(parents.tolist(), children.tolist(), strict=True)):
+            chosen[child] = nearest[chosen[parent], step]
+    return np.asarray(ways[chosen, np.arange(len(chosen))])
 
 
 def agreed(
@@ -52,16 +57,12 @@ def agreed(
     """
     poses, solved = _cameras_matched(views, symmetries, solve)
     for _ in range(CHECKS):
-        predicted = predicted_poses(solved, views)
-        turned = np.array(
-            [
-                _nearest(expected, pose, symmetries) if free else pose
-                for expected, pose, free in zip(predicted, poses, turnable, strict=True)
-            ]
-        )
-        if np.array_equal(turned, poses):
+        ways = _ways_round(poses, symmetries)
+        chosen = np.where(turnable, _nearest(predicted_poses(solved, views), ways), 0)
+        if not chosen.any():
             break
-        poses, solved = turned, solve(turned)
+        poses = ways[chosen, np.arange(len(chosen))]
+        solved = solve(poses)
     return poses, solved
 
 
@@ -100,15 +101,20 @@ def _cameras_matched(
     return best[1], best[2]
 
 
-def _nearest(expected: Array, pose: Array, symmetries: Sequence[TargetSymmetry]) -> Array:
-    """Return `pose` read the way round in which its rotation is nearest to the `expected` pose's."""
-    turned = np.array([pose, *(symmetry.turned_from_world @ pose for symmetry in symmetries)])
-    _, angles = pose_error(np.broadcast_to(expected, turned.shape), turned)
-    return np.asarray(turned[int(np.argmin(angles))])
+def _ways_round(poses: Array, symmetries: Sequence[TargetSymmetry]) -> Array:
+    """Return the poses (n, 4, 4) read in every way round (k, n, 4, 4), first as they are."""
+    return np.stack([poses, *(symmetry.turned_from_world @ poses for symmetry in symmetries)])
 
 
-def _nearest_first(readings: Array) -> list[tuple[int, int]]:
-    """Return edges (parent, child) of the minimum spanning tree of the readings, from the first on (Prim)."""
+def _nearest(expected: Array, ways: Array) -> Ints:
+    """Return which of the `ways` round (k, n, 4, 4) has its rotation nearest to the `expected` poses' (n,)."""
+    # The trace of a turn grows as its angle shrinks.
+    traces = (expected[:, :3, :3] * ways[:, :, :3, :3]).sum(axis=(2, 3))
+    return np.asarray(np.argmax(traces, axis=0))
+
+
+def _nearest_first(readings: Array) -> Ints:
+    """Return edges (parent, child) (n - 1, 2) of the readings' minimum spanning tree, from the first on (Prim)."""
     span = np.ptp(readings, axis=0) if len(readings) else np.zeros(0)
     places = readings / np.where(span > 0, span, 1)
     count = len(places)
@@ -121,5 +127,5 @@ def _nearest_first(readings: Array) -> list[tuple[int, int]]:
         nearer = outside & (step < distance)
         distance[nearer], parent[nearer] = step[nearer], newest
         newest = int(np.argmin(np.where(outside, distance, np.inf)))
-        edges.append((int(parent[newest]), newest))
-    return edges
+        edges.append((parent[newest], newest))
+    return np.array(edges, dtype=np.intp).reshape(-1, 2)

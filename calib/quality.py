@@ -7,7 +7,7 @@ from typing import Any
 from calib.calibration import Calibration, Quality, ViewQuality
 from calib.likelihood.held_out import HeldOut
 from calib.observations import Observation
-from calib.residuals import ViewResidual, root_mean_square, view_residual
+from calib.residuals import ViewResidual, root_mean_square, view_residuals
 from calib.session import Session
 
 
@@ -22,7 +22,7 @@ def judged(
 
     Where no view is marked `verify`, `left_one_out` tells how well each is predicted by the others.
     """
-    residuals = [view_residual(calibration, session, observation) for observation in observations]
+    residuals = view_residuals(calibration, session, observations)
     others = {error.view: error.rms_px for error in left_one_out}
     views = [
         ViewQuality(

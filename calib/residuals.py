@@ -10,6 +10,8 @@ from calib.calibration import Calibration
 from calib.disks import centroid_offsets
 from calib.errors import CalibError
 from calib.lens import project_points
+from calib.likelihood.blocks import disk_offsets
+from calib.likelihood.measurements import point_views
 from calib.observations import Observation
 from calib.pose_from_view import pose_from_view
 from calib.session import Intrinsics, Session
@@ -56,45 +58,77 @@ class ViewResidual:
         return float(pose_error(self.predicted[None], self.measured[None])[1][0])
 
 
-def view_residual(
-    calibration: Calibration, session: Session, observation: Observation, measure_pose: bool = False
-) -> ViewResidual:
-    """Compare a view with the prediction of `calibration`, reading a symmetric target the way nearer to it.
+def view_residuals(
+    calibration: Calibration,
+    session: Session,
+    observations: Sequence[Observation],
+    measure_pose: bool = False,
+) -> list[ViewResidual]:
+    """Compare each view with the prediction of `calibration`, reading a symmetric target the way nearer to it.
 
-    With `measure_pose` the view's own pose is estimated from its points. A camera that the calibration knows
+    With `measure_pose` each view's own pose is estimated from its points. A camera that the calibration knows
     no place for is predicted where this very view puts it. Raises CalibError.
     """
-    view, target = session.views[observation.view], session.target
-    name = session.cameras[observation.camera].name
-    if observation.pose is not None:
-        measured = observation.pose
-        predicted = calibration.world_from_camera(view.readings, name) if calibration.joints else measured
-        return ViewResidual(observation.view, None, predicted, measured if calibration.joints else None)
-    lens = calibration.cameras[calibration.camera_index(name)].intrinsics
+    found: dict[int, ViewResidual] = {}
+    for index, camera in enumerate(session.cameras):
+        own = [observation for observation in observations if observation.camera == index]
+        given = [observation for observation in own if observation.pose is not None]
+        seen = [observation for observation in own if observation.pose is None]
+        residuals = _of_poses(calibration, session, camera.name, given)
+        if seen:
+            residuals += _of_points(calibration, session, camera.name, seen, measure_pose)
+        found |= {residual.view: residual for residual in residuals}
+    return [found[observation.view] for observation in observations]
+
+
+def _of_poses(
+    calibration: Calibration, session: Session, camera: str, given: Sequence[Observation]
+) -> list[ViewResidual]:
+    """Return the residuals of views whose poses another system gave; without joints nothing predicts them."""
+    residuals = []
+    for observation in given:
+        assert observation.pose is not None
+        predicted, measured = observation.pose, None
+        if calibration.joints:
+            predicted = calibration.world_from_camera(session.views[observation.view].readings, camera)
+            measured = observation.pose
+        residuals.append(ViewResidual(observation.view, None, predicted, measured))
+    return residuals
+
+
+def _of_points(
+    calibration: Calibration, session: Session, camera: str, seen: Sequence[Observation], measure_pose: bool
+) -> list[ViewResidual]:
+    """Return the residuals of views of one camera, one or more, in which points are seen."""
+    target, lens = session.target, calibration.cameras[calibration.camera_index(camera)].intrinsics
     if lens is None:
-        raise CalibError(f"the calibration knows no lens of camera '{name}': its pictures cannot be judged")
-    if not calibration.joints:
-        predicted = measured_pose(observation, target, lens)
-        pixels = predicted_pixels(observation, target, lens, predicted) - observation.pixels
-        return ViewResidual(observation.view, pixels, predicted, None)
-    predicted = calibration.world_from_camera(view.readings, name)
-    observation, pixels = read_as_predicted(observation, target, lens, predicted)
-    return ViewResidual(
-        observation.view,
-        pixels,
-        predicted,
-        measured_pose(observation, target, lens) if measure_pose else None,
-    )
+        raise CalibError(f"the calibration knows no lens of camera '{camera}': its pictures cannot be judged")
+    if calibration.joints:
+        readings = [session.views[observation.view].readings for observation in seen]
+        predicted = calibration.world_from_camera(readings, camera)
+        seen = read_as_predicted(seen, target, lens, predicted)
+    else:
+        predicted = np.array([measured_pose(observation, target, lens) for observation in seen])
+    pixels = misfits(seen, target, lens, predicted)
+    return [
+        ViewResidual(
+            observation.view,
+            pixels[row],
+            predicted[row],
+            measured_pose(observation, target, lens) if measure_pose and calibration.joints else None,
+        )
+        for row, observation in enumerate(seen)
+    ]
 
 
-def predicted_pixels(observation: Observation, target: Target, lens: Intrinsics, pose: Array) -> Array:
-    """Return where a camera at `pose` (4, 4) has the observation's points measured (n, 2), in px."""
-    world, camera_from_world = target_points(target)[observation.ids], inverse(pose)
-    pixels = project_points(world @ camera_from_world[:3, :3].T + camera_from_world[:3, 3], lens)
-    diameter = disk_diameter(target)
-    if observation.disk and diameter is not None:
-        pixels = pixels + centroid_offsets(world, camera_from_world, diameter, lens)
-    return pixels
+def misfits(
+    observations: Sequence[Observation], target: Target, lens: Intrinsics, poses: Array
+) -> list[Array]:
+    """Return by how much a camera at `poses` (n, 4, 4) has each view's points (q, 2) elsewhere than measured, in px."""
+    seen = point_views(observations, target_points(target))
+    pixels = _projected(seen.world, poses, lens) + disk_offsets(seen, poses, lens, disk_diameter(target))
+    away = pixels - seen.pixels
+    return [away[row, : len(observation.ids)] for row, observation in enumerate(observations)]
 
 
 def measured_pose(observation: Observation, target: Target, lens: Intrinsics) -> Array:
@@ -109,14 +143,30 @@ def measured_pose(observation: Observation, target: Target, lens: Intrinsics) ->
 
 
 def read_as_predicted(
-    observation: Observation, target: Target, lens: Intrinsics, predicted: Array
-) -> tuple[Observation, Array]:
-    """Return the observation read the way round nearer to a camera at `predicted` (4, 4), and its misfits (n, 2)."""
-    ways = [observation, *(observation.turned(turn) for turn in target_symmetries(target))]
-    misfits = [predicted_pixels(way, target, lens, predicted) - way.pixels for way in ways]
-    sizes = [float(np.nan_to_num(np.abs(misfit), nan=1e9).sum()) for misfit in misfits]
-    best = int(np.argmin(sizes))
-    return ways[best], misfits[best]
+    observations: Sequence[Observation], target: Target, lens: Intrinsics, predicted: Array
+) -> list[Observation]:
+    """Return the views, each read the way round nearer to a camera at `predicted` (n, 4, 4)."""
+    symmetries = target_symmetries(target)
+    if not symmetries:
+        return list(observations)
+    points = target_points(target)
+    seen = point_views(observations, points)
+    sizes = []
+    for label in [np.arange(len(points)), *(np.argsort(turn.permutation) for turn in symmetries)]:
+        away = np.abs(_projected(points[label[seen.ids]], predicted, lens) - seen.pixels).sum(axis=-1)
+        sizes.append((np.nan_to_num(away, nan=1e9) * seen.present).sum(axis=1))
+    ways = np.argmin(sizes, axis=0)
+    return [
+        observation.turned(symmetries[way - 1]) if way else observation
+        for observation, way in zip(observations, ways.tolist(), strict=True)
+    ]
+
+
+def _projected(world: Array, poses: Array, lens: Intrinsics) -> Array:
+    """Return where cameras at `poses` (n, 4, 4) see their points `world` (n, q, 3): pixels (n, q, 2)."""
+    camera_from_world = inverse(poses)
+    points = world @ np.swapaxes(camera_from_world[:, :3, :3], 1, 2) + camera_from_world[:, None, :3, 3]
+    return project_points(points, lens)
 
 
 def root_mean_square(residuals: Sequence[ViewResidual]) -> float | None:

@@ -67,11 +67,9 @@ def readings_at_rest(readings: Array, labels: Ints) -> Array:
 
 def _clusters(rows: Array, tolerance: float) -> Ints:
     """Return a label for each row (n,), shared by all within `tolerance` of a cluster's first row."""
-    labels = np.zeros(len(rows), dtype=np.intp)
-    heads: list[Array] = []
-    for index, row in enumerate(rows):
-        near = [label for label, head in enumerate(heads) if np.abs(row - head).max(initial=0) <= tolerance]
-        labels[index] = near[0] if near else len(heads)
-        if not near:
-            heads.append(row)
+    labels = np.full(len(rows), -1, dtype=np.intp)
+    while (labels < 0).any():
+        head = rows[np.argmax(labels < 0)]
+        near = (np.abs(rows - head) <= tolerance).all(axis=1)
+        labels[near & (labels < 0)] = labels.max() + 1
     return labels

@@ -16,7 +16,7 @@ from calib.calibration import Calibration
 from calib.closed_form import PoseViews
 from calib.errors import FormatError
 from calib.observations import Progress, observe
-from calib.residuals import ViewResidual, view_residual
+from calib.residuals import ViewResidual, view_residuals
 from calib.session import JointKind, Session
 from calib.sweeps import sweep_labels
 from calib.transforms import inverse, rotation_log
@@ -101,10 +101,7 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
     marked = any(view.use == "verify" for view in session.views)
     judged = [index for index, view in enumerate(session.views) if view.use == "verify" or not marked]
     observed = observe(session, progress, judged)
-    residuals = [
-        view_residual(calibration, session, observation, measure_pose=True)
-        for observation in observed.observations
-    ]
+    residuals = view_residuals(calibration, session, observed.observations, measure_pose=True)
     errors = np.concatenate([residual.errors for residual in residuals])
     placed = bool(calibration.joints)
     return Verification(

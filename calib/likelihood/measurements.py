@@ -31,30 +31,30 @@ class PointViews:
 
 
 def point_views(observations: Sequence[Observation], points: Array) -> PointViews:
-    """Return the views of one camera; `points` (t, 3) are the target's by id.
+    """Return the views of one camera, one or more; `points` (t, 3) are the target's by id.
 
     Points without a covariance count as known to 1 px: only their ratios matter then.
     """
-    count = max((len(observation.ids) for observation in observations), default=0)
-    shape = (len(observations), count)
-    ids, pixels, present = np.zeros(shape, dtype=np.int64), np.zeros((*shape, 2)), np.zeros(shape)
-    whitening = np.broadcast_to(np.eye(2), (*shape, 2, 2)).copy()
-    for row, observation in enumerate(observations):
-        seen = len(observation.ids)
-        # Places without a point repeat the first one, so that their projection is finite.
-        ids[row], pixels[row] = observation.ids[0], observation.pixels[0]
-        ids[row, :seen], pixels[row, :seen] = observation.ids, observation.pixels
-        present[row, :seen] = 1
-        if observation.covariances is not None:
-            # The inverse of a covariance's lower Cholesky factor whitens.
-            whitening[row, :seen] = np.linalg.inv(np.linalg.cholesky(observation.covariances))
+    counts = np.array([len(observation.ids) for observation in observations], dtype=np.intp)
+    present = np.arange(counts.max(initial=0)) < counts[:, None]
+    ids, pixels = np.zeros(present.shape, dtype=np.int64), np.zeros((*present.shape, 2))
+    ids[present] = np.concatenate([observation.ids for observation in observations])
+    pixels[present] = np.concatenate([observation.pixels for observation in observations])
+    # Places without a point repeat the first one, so that their projection is finite.
+    ids = np.where(present, ids, ids[:, :1])
+    whitening = np.broadcast_to(np.eye(2), (*present.shape, 2, 2)).copy()
+    known = np.array([observation.covariances is not None for observation in observations], dtype=bool)
+    if known.any():
+        covariances = [o.covariances for o in observations if o.covariances is not None]
+        # The inverse of a covariance's lower Cholesky factor whitens.
+        whitening[present & known[:, None]] = np.linalg.inv(np.linalg.cholesky(np.concatenate(covariances)))
     return PointViews(
         views=np.array([observation.view for observation in observations], dtype=np.intp),
         ids=ids,
         world=points[ids],
-        pixels=pixels,
+        pixels=np.where(present[..., None], pixels, pixels[:, :1]),
         whitening=whitening,
-        present=present,
+        present=present.astype(float),
         disk=np.array([observation.disk for observation in observations], dtype=bool),
     )
 
