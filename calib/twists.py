@@ -13,7 +13,7 @@ def joint_screw(chain: Chain, joint: int) -> Array:
     """Return the joint's unit screw (6,), rotation first, in the world at readings 0."""
     axis, point = chain.axes[joint], chain.points[joint]
     if chain.revolute[joint]:
-        return np.concatenate([axis, np.cross(point, axis)])
+        return np.concatenate([axis, skew(point) @ axis])
     return np.concatenate([np.zeros(3), axis])
 
 

@@ -1,7 +1,7 @@
 """From a session and a first solution to the likelihood, and the estimate it starts at."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from calib.chain import Chain
 from calib.closed_form import PoseViews
 from calib.likelihood.lens_terms import lens_vector
 from calib.likelihood.measurements import GivenPoses, point_views
-from calib.likelihood.problem import Estimate, Group, Problem
+from calib.likelihood.problem import Estimate, Group, Problem, offsets_at
 from calib.likelihood.state import Layout, State
 from calib.observations import Observation
 from calib.session import Intrinsics, Session
@@ -69,7 +69,8 @@ def built(session: Session, observations: Sequence[Observation], start: Start) -
         disk_diameter=disk_diameter(session.target),
         bulges=np.zeros((len(points), 0)),
     )
-    return problem, Estimate(state, np.zeros_like(readings), np.zeros(len(layout)))
+    estimate = Estimate(state, np.zeros_like(readings), np.zeros(len(layout)), offsets=())
+    return problem, replace(estimate, offsets=offsets_at(problem, estimate))
 
 
 def _padded(prior: Array | None, count: int) -> Array:

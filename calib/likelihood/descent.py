@@ -30,16 +30,15 @@ class Descent:
 def descend(problem: Problem, start: Estimate, weights: Weights) -> Descent:
     """Return the most likely estimate that is found going down from `start`.
 
-    What centroids of disks are off by hardly depends on the estimate: it is held while going down, and taken anew
-    until it no longer matters.
+    What centroids of disks are off by is held while going down, and taken anew until it no longer matters.
     """
     estimate = start
     for _ in range(MOST_ROUNDS):
-        offsets = offsets_at(problem, estimate)
-        estimate, evaluation, converged = _round(problem, estimate, weights, offsets)
+        estimate, evaluation, converged = _round(problem, estimate, weights)
         renewed = offsets_at(problem, estimate)
-        if all(_close(old, new) for old, new in zip(offsets, renewed, strict=True)):
+        if all(_close(old, new) for old, new in zip(estimate.offsets, renewed, strict=True)):
             break
+        estimate = replace(estimate, offsets=renewed)
     return Descent(estimate, evaluation, normal_equations(problem, estimate, evaluation), converged)
 
 
@@ -47,17 +46,15 @@ def _close(old: Array | None, new: Array | None) -> bool:
     return old is None or new is None or bool(np.nanmax(np.abs(old - new), initial=0) < 1e-4)
 
 
-def _round(
-    problem: Problem, estimate: Estimate, weights: Weights, offsets: tuple[Array | None, ...]
-) -> tuple[Estimate, Evaluation, bool]:
-    evaluation = evaluate(problem, estimate, weights, offsets)
+def _round(problem: Problem, estimate: Estimate, weights: Weights) -> tuple[Estimate, Evaluation, bool]:
+    evaluation = evaluate(problem, estimate, weights)
     damping, growth = 1e-6, 4.0
     for _ in range(MOST_STEPS):
         equations = normal_equations(problem, estimate, evaluation)
         while True:
             step = solve_damped(equations, problem.free, damping)
             candidate = stepped(problem, estimate, equations, step)
-            there = evaluate(problem, candidate, weights, offsets)
+            there = evaluate(problem, candidate, weights)
             if there.cost <= evaluation.cost:
                 break
             damping, growth = damping * growth, growth * 2

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.likelihood.measurements import GivenPoses, PointViews
 from calib.likelihood.outliers import Misfits, misfits, point_noise
-from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, all_in, evaluate, offsets_at
+from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, all_in, evaluate
 from calib.likelihood.reading_noise import PoseMisfit, estimated_reading_std
 
 Array = NDArray[np.float64]
@@ -23,13 +23,12 @@ def seen_noise(
 ) -> tuple[Problem, Misfits, bool]:
     """Return the problem with each noise as large as it is seen to be, the misfits, and whether that was so before."""
     as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
-    there = evaluate(problem, estimate, all_in(problem), offsets_at(problem, estimate))
+    there = evaluate(problem, estimate, all_in(problem))
     scaled = _with_measurement_noise(problem, there, weights)
-    offsets = offsets_at(scaled, as_read)
     if unknown.any():
-        std = _reading_std(scaled, evaluate(scaled, as_read, weights, offsets), weights, unknown)
+        std = _reading_std(scaled, evaluate(scaled, as_read, weights), weights, unknown)
         scaled = replace(scaled, reading_std=std)
-    found = misfits(scaled, evaluate(scaled, as_read, all_in(scaled), offsets))
+    found = misfits(scaled, evaluate(scaled, as_read, all_in(scaled)))
     return scaled, found, _much_the_same(problem, scaled)
 
 

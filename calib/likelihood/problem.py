@@ -52,12 +52,14 @@ class Problem:
 class Estimate:
     """A state, and how far each view's true readings are from what was read (n, m), over their noisiness.
 
-    `travel` (p,) adds up the steps since the start.
+    `travel` (p,) adds up the steps since the start. `offsets` are what each group's centroids of disks are off by
+    (n, q, 2) in px, None for given poses: they hardly depend on the estimate, and are renewed now and then.
     """
 
     state: State
     reading_errors: Array
     travel: Array
+    offsets: tuple[Array | None, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +101,11 @@ def offsets_at(problem: Problem, estimate: Estimate) -> tuple[Array | None, ...]
     for group in problem.groups:
         if not isinstance(group.data, PointViews):
             offsets.append(None)
-            continue
-        if problem.disk_diameter is None or not group.data.disk.any():
+        elif problem.disk_diameter is None or not group.data.disk.any():
             offsets.append(np.zeros_like(group.data.pixels))
-            continue
-        poses = _chain_terms(problem, group, estimate).poses
-        offsets.append(disk_offsets(group.data, poses, lens_of(group, estimate.state), problem.disk_diameter))
+        else:
+            poses, lens = _chain_terms(problem, group, estimate).poses, lens_of(group, estimate.state)
+            offsets.append(disk_offsets(group.data, poses, lens, problem.disk_diameter))
     return tuple(offsets)
 
 
@@ -116,13 +117,11 @@ def lens_of(group: Group, state: State) -> Intrinsics:
     return lens_from_vector(values, group.lens)
 
 
-def evaluate(
-    problem: Problem, estimate: Estimate, weights: Weights, offsets: tuple[Array | None, ...]
-) -> Evaluation:
+def evaluate(problem: Problem, estimate: Estimate, weights: Weights) -> Evaluation:
     """Return the likelihood and its terms at `estimate`."""
     state = estimate.state
     terms, cost = [], 0.0
-    for group, weight, offset in zip(problem.groups, weights.groups, offsets, strict=True):
+    for group, weight, offset in zip(problem.groups, weights.groups, estimate.offsets, strict=True):
         chain = _chain_terms(problem, group, estimate)
         if isinstance(group.data, PointViews):
             lens = state.lenses[group.camera]

@@ -23,7 +23,6 @@ from calib.likelihood.problem import (
     Weights,
     all_in,
     evaluate,
-    offsets_at,
 )
 from calib.likelihood.state import State
 from calib.likelihood.uncertainty import noise_variance, step_covariance
@@ -87,7 +86,7 @@ def refine(session: Session, observations: Sequence[Observation], start: Start) 
         estimate,
         weights,
         descent.evaluation,
-        evaluate(problem, as_read, weights, offsets_at(problem, as_read)),
+        evaluate(problem, as_read, weights),
         descent.equations.information,
     )
     return Refined(problem, weights, descent, covariance, float(np.sqrt(noise)), aside, predicted)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calib.chain import Chain
 from calib.likelihood.lens_terms import LENS_NAMES
 from calib.transforms import any_normal
-from calib.twists import exp_twist
+from calib.twists import exp_twist, skew
 
 Array = NDArray[np.float64]
 
@@ -34,19 +34,19 @@ class State:
 
     def moved(self, step: Array, layout: "Layout") -> "State":
         """Return the state after a step (p,) of the layout's parameters."""
-        chain, mounts = self.chain, self.mounts.copy()
-        axes, points, scales = chain.axes.copy(), chain.points.copy(), chain.scales.copy()
-        for joint in range(len(chain)):
-            motion = exp_twist(joint_basis(chain, joint) @ step[layout.shapes[joint]])
-            axes[joint] = motion[:3, :3] @ axes[joint]
-            points[joint] = motion[:3, :3] @ points[joint] + motion[:3, 3]
-            scales[joint] *= np.exp(step[layout.scales[joint]])
-        for camera in range(len(mounts)):
-            mounts[camera] = mounts[camera] @ exp_twist(step[layout.mounts[camera]])
-        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        chain, joints = self.chain, len(self.chain)
+        twists = [joint_basis(chain, joint) @ step[layout.shapes[joint]] for joint in range(joints)]
+        motions = exp_twist(np.array([*twists, *(step[part] for part in layout.mounts)]))
+        turns, shifts = motions[:joints, :3, :3], motions[:joints, :3, 3]
+        axes = (turns @ chain.axes[..., None])[..., 0]
         return State(
-            chain=replace(chain, axes=axes, points=points, scales=scales),
-            mounts=mounts,
+            chain=replace(
+                chain,
+                axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),
+                points=(turns @ chain.points[..., None])[..., 0] + shifts,
+                scales=chain.scales * np.exp(step[list(layout.scales)]),
+            ),
+            mounts=self.mounts @ motions[joints:],
             lenses=tuple(
                 None if lens is None else lens + step[part]
                 for lens, part in zip(self.lenses, layout.lenses, strict=True)
@@ -113,9 +113,9 @@ def joint_basis(chain: Chain, joint: int) -> Array:
     """Return the twists (6, 4 or 2) in the world that move a joint's axis without sliding it along itself."""
     axis, point = chain.axes[joint], chain.points[joint]
     first = any_normal(axis)
-    normals = [first, np.cross(axis, first)]
-    turns = [np.concatenate([normal, np.cross(point, normal)]) for normal in normals]
-    if not chain.revolute[joint]:
-        return np.column_stack([np.concatenate([normal, np.zeros(3)]) for normal in normals])
-    shifts = [np.concatenate([np.zeros(3), normal]) for normal in normals]
-    return np.column_stack(turns + shifts)
+    normals = np.column_stack([first, skew(axis) @ first])
+    basis = np.zeros((6, 4 if chain.revolute[joint] else 2))
+    basis[:3, :2] = normals
+    if chain.revolute[joint]:
+        basis[3:, :2], basis[3:, 2:] = skew(point) @ normals, normals
+    return basis
