@@ -13,7 +13,7 @@ data flows through them:
     transforms, twists, chain    rigid motions, and the chain as a product of exponentials
     sweeps, screws, closed_form  the paper's method;  orientation  of symmetric targets;  first_solution  all of it
     nominal, unfinished          sessions with a drawing, and sessions that were cut off
-    likelihood/, most_likely     the fit
+    likelihood/, most_likely     the fit;  advice  what it does not tell, in words
     links, dh, document          D-H and base read off the screws, and all written down: calibration
     pose_covariance              how sure a pose is
     residuals, quality, verification, paper      is it good?

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from calib.likelihood.building import Start
 from calib.likelihood.document_covariance import document_jacobian
 from calib.likelihood.refinement import Refined, refine
+from calib.likelihood.weakness import weaknesses
 from calib.observations import Observation
 from calib.residuals import read_as_predicted
 from calib.session import Session
@@ -38,6 +39,7 @@ def most_likely(session: Session, observations: Sequence[Observation], start: So
         covariance=_document_covariance(session, refined),
         left_out=(aside.views, aside.points),
         held_out=refined.held_out,
+        weaknesses=weaknesses(session, refined.problem, refined.weights, refined.descent, refined.noise**2),
     )
 
 
@@ -87,17 +89,6 @@ def _print_scale_std(target: Target) -> float:
     if isinstance(target, NoTarget) or target.pitch_std is None:
         return 0.0
     return target.pitch_std / target.pitch
-
-
-def focal_std(solution: Solution) -> list[float | None]:
-    """Return the relative standard deviation of each camera's focal length, 0 where it has no lens."""
-    assert solution.covariance is not None
-    names, matrix = solution.covariance
-    deviations = dict(zip(names, np.sqrt(np.diag(matrix)), strict=True))
-    return [
-        0.0 if lens is None else float(deviations[f"cameras.{index}.intrinsics.fx"] / lens.fx)
-        for index, lens in enumerate(solution.lenses)
-    ]
 
 
 def left_out_in_words(solution: Solution) -> list[str]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from calib.chain import Chain
 from calib.likelihood.held_out import HeldOut
+from calib.likelihood.weakness import Weakness
 from calib.session import Intrinsics, WorldOrigin
 
 Array = NDArray[np.float64]
@@ -19,8 +20,8 @@ class Solution:
 
     `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
     their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
-    well each view is predicted by the fit of all others. `prior` (k, k) is what a nominal model knows of the chain, and
-    `world_from_base` (4, 4) its base.
+    well each view is predicted by the fit of all others, `weaknesses` what the views leave in the dark. `prior` (k, k)
+    is what a nominal model knows of the chain, and `world_from_base` (4, 4) its base.
     """
 
     chain: Chain
@@ -30,5 +31,6 @@ class Solution:
     covariance: tuple[list[str], Array] | None = None
     left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
     held_out: Sequence[HeldOut] = ()
+    weaknesses: Sequence[Weakness] = ()
     prior: Array | None = None
     world_from_base: Array | None = None

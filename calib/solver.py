@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
+from calib.advice import weakness_in_words
 from calib.calibration import Calibration, Quality
 from calib.document import Method, document
 from calib.errors import UnsolvableError
 from calib.first_solution import CameraViews, camera_views, first_solution
 from calib.lens_calibration import lens_in_words
-from calib.most_likely import focal_std, left_out_in_words, most_likely
+from calib.most_likely import left_out_in_words, most_likely
 from calib.nominal import nominal_solution
 from calib.observations import Observation, Progress, observe
 from calib.quality import judged
@@ -36,15 +37,15 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
         )
     seen = camera_views(session, fit)
     solution = _start(session, fit, seen, method)
-    lens_std = seen.focal_std
-    if method == "ml" and session.joints:
+    fitted = method == "ml" and bool(session.joints)
+    if fitted:
         solution = most_likely(session, fit, solution)
-        lens_std = [
-            None if before is None else now for before, now in zip(lens_std, focal_std(solution), strict=True)
-        ]
     warnings = [] if cut_off is None else [cut_off]
-    for camera, std in zip(session.cameras, lens_std, strict=True):
-        warnings += lens_in_words(camera.name, std)
+    units = {joint.name: joint.reading_unit for joint in session.joints}
+    warnings += [weakness_in_words(weakness, units) for weakness in solution.weaknesses]
+    for camera, std in zip(session.cameras, seen.focal_std, strict=True):
+        if std is None or not fitted:
+            warnings += lens_in_words(camera.name, std)
     warnings += [*left_out_in_words(solution), *observed.missing]
     calibration = document(session, method, solution, Quality())
     quality = judged(calibration, session, observed.observations, solution.held_out, warnings)

@@ -13,6 +13,8 @@
     noise                how noisy points and poses are;  reading_noise  how noisy readings
     refinement           all of it in turn, until nothing changes
     uncertainty          the covariance;  document_covariance  in the document's own numbers
+    quantities           what a person asks about;  weakness  what of it the views do not tell
+    other_views          what other views would tell;  usual  of a rig whose lens is open
     held_out             how well each view is predicted by all others
 
 A fit starts at `refinement.refine`.

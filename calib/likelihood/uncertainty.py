@@ -16,15 +16,19 @@ def noise_variance(problem: Problem, descent: Descent, weights: Weights) -> floa
 
 
 def step_covariance(problem: Problem, descent: Descent, variance: float) -> Array:
-    """Return the covariance (p, p) of a step of the parameters, zero where they are fixed.
+    """Return the covariance (p, p) of a step of the parameters, zero where they are fixed."""
+    return covariance_of(descent.equations.information, problem.free, variance)
+
+
+def covariance_of(information: Array, free: NDArray[np.bool_], variance: float) -> Array:
+    """Return the covariance (p, p) that goes with an `information` (p, p), zero for what is not `free` (p,).
 
     Directions that the measurements say nothing about are given a variance so large that it cannot be overlooked.
     """
-    free = np.flatnonzero(problem.free)
-    information = descent.equations.information[np.ix_(free, free)]
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    own = np.ix_(free, free)
+    scale = 1 / np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
+    values, vectors = np.linalg.eigh(information[own] * np.outer(scale, scale))
     inverse = (vectors / np.maximum(values, 1e-13 * values.max())) @ vectors.T
-    covariance = np.zeros((len(problem.free), len(problem.free)))
-    covariance[np.ix_(free, free)] = variance * inverse * np.outer(scale, scale)
+    covariance = np.zeros_like(information)
+    covariance[own] = variance * inverse * np.outer(scale, scale)
     return covariance
