@@ -154,8 +154,8 @@ def information_of(
         regressors=problem.regressors[others.views],
         prior=np.zeros_like(problem.prior),
     )
-    still = replace(estimate, reading_errors=np.zeros_like(others.readings))
-    evaluation = evaluate(imagined, still, Weights(tuple(weights)), tuple(offsets))
+    still = replace(estimate, reading_errors=np.zeros_like(others.readings), offsets=tuple(offsets))
+    evaluation = evaluate(imagined, still, Weights(tuple(weights)))
     return normal_equations(imagined, still, evaluation).information
 
 

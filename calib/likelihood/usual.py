@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.normal import normal_equations
-from calib.likelihood.problem import Problem, Weights, evaluate, offsets_at
+from calib.likelihood.problem import Problem, Weights, evaluate
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def usual_rig(problem: Problem, descent: Descent, weights: Weights) -> Descent:
     started = replace(descent.estimate, travel=travel)
     found = descend(replace(problem, prior=prior), started, weights)
     estimate = replace(found.estimate, travel=descent.estimate.travel)
-    there = evaluate(problem, estimate, weights, offsets_at(problem, estimate))
+    there = evaluate(problem, estimate, weights)
     return Descent(estimate, there, normal_equations(problem, estimate, there), found.converged)
 
 
