@@ -7,17 +7,18 @@ metres. The screws, mounts and lenses are the result; D-H and base are views of 
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from calib.chain import Chain
+from calib.corrections import Corrections, checked_sides
 from calib.dh import link_transform
 from calib.documents import read_json, validate, write_json
 from calib.errors import CalibError
-from calib.pose_covariance import TwistCovariance, pose_covariances, twist_covariance
+from calib.pose_covariance import CorrectedReadings, TwistCovariance, pose_covariances, twist_covariance
 from calib.session import (
     Document,
     Intrinsics,
@@ -28,6 +29,8 @@ from calib.session import (
     StoredTarget,
     WorldOrigin,
 )
+from calib.stated_corrections import StatedCorrections
+from calib.targets import Target, target_points
 
 CALIBRATION_FORMAT = "activecam.calibration/1"
 
@@ -106,6 +109,8 @@ class Quality(Document):
     held_out_rotation_rad: Number | None = None
     held_out_by: Literal["verify", "leave_one_view_out"] | None = None
     """By which views: those marked `verify`, or each by the fit of all others."""
+    corrections: list[str] = Field(default_factory=list)
+    """A sentence for each of the calibration's corrections."""
     views: list[ViewQuality] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)
 
@@ -119,7 +124,7 @@ class Calibration(Document):
     dh: list[DhLink]
     world_from_base: RigidRows
     cameras: Annotated[list[CalibratedCamera], Field(min_length=1)]
-    corrections: dict[str, Any] = Field(default_factory=dict)
+    corrections: StatedCorrections = Field(default_factory=StatedCorrections)
     range: list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
     covariance: Covariance | None = None
     quality: Quality
@@ -137,6 +142,9 @@ class Calibration(Document):
         for index, camera in enumerate(self.cameras):
             if camera.link is not None and camera.link not in names:
                 raise ValueError(f"cameras[{index}].link: '{camera.link}' is not a joint of this calibration")
+        for name in self.corrections.joint_names():
+            if name not in names:
+                raise ValueError(f"corrections: '{name}' is not a joint of this calibration")
         return self
 
     @cached_property
@@ -158,10 +166,14 @@ class Calibration(Document):
             raise CalibError(f"there is no camera '{name}' in this calibration; it has {', '.join(names)}")
         return names.index(name)
 
-    def world_from_camera(self, readings: ArrayLike, camera: str | None = None) -> NDArray[np.float64]:
+    def world_from_camera(
+        self, readings: ArrayLike, camera: str | None = None, approached: ArrayLike | None = None
+    ) -> NDArray[np.float64]:
         """Return the camera's poses (n, 4, 4) at `readings` (n, m), or (4, 4) for one vector (m,).
 
-        Raises ReadingsError for readings of the wrong length, CalibError for a camera that has no mount.
+        `approached` (n, m) or (m,) says from which side each joint came to its reading: +1 from below, -1 from above.
+        Where it is 0, or not given, a joint with backlash is taken to stand in the middle of its play. Raises
+        ReadingsError for readings of the wrong length, CalibError for a camera that has no mount.
         """
         index = self.camera_index(camera)
         mount = self._mounts[index]
@@ -170,20 +182,42 @@ class Calibration(Document):
                 f"the lens of camera '{self.cameras[index].name}' is calibrated, but not where it sits; "
                 "solve a session whose views have joint readings"
             )
-        return self.chain.poses(readings, self._links[index], mount)
+        values = self.chain.checked(readings)
+        corrections = self._joint_corrections
+        if corrections.models or approached is not None:
+            rows = np.atleast_2d(values)
+            values = corrections.applied(rows, checked_sides(approached, rows)).reshape(values.shape)
+        return self.chain.poses(values, self._links[index], mount)
 
-    def pose_covariance(self, readings: ArrayLike, camera: str | None = None) -> NDArray[np.float64] | None:
+    def pose_covariance(
+        self, readings: ArrayLike, camera: str | None = None, approached: ArrayLike | None = None
+    ) -> NDArray[np.float64] | None:
         """Return the poses' covariances (n, 6, 6) at `readings` (n, m), or (6, 6) for one vector; None if unknown.
 
-        Rotation (rad) then position (m), in the camera's frame. Raises as `world_from_camera` does.
+        Rotation (rad) then position (m), in the camera's frame. Of a joint with backlash whose side of approach is not
+        known, half its play to either side is added. Raises as `world_from_camera` does.
         """
         index = self.camera_index(camera)
         known, mount, link = self._twist_covariances[index], self._mounts[index], self._links[index]
         if known is None or mount is None:
             return None
         values = self.chain.checked(readings)
-        covariances = pose_covariances(self.chain, mount, link, known, np.atleast_2d(values))
+        rows, corrections = np.atleast_2d(values), self._joint_corrections
+        sides = checked_sides(approached, rows)
+        corrected = CorrectedReadings(
+            corrections.applied(rows, sides),
+            corrections.regressors(rows, sides),
+            corrections.unknown_side_std(sides),
+        )
+        covariances = pose_covariances(self.chain, mount, link, known, corrected)
         return covariances if values.ndim == 2 else np.asarray(covariances[0])
+
+    def points_of(self, target: Target) -> NDArray[np.float64]:
+        """Return where a target's points are in the world (t, 3), out of its plane where this plate's warp is known."""
+        points, warp = target_points(target), self.corrections.target_warp
+        if warp is not None and target == self.target:
+            points[:, 2] += warp.bulge(points)
+        return points
 
     def base_from_world(self) -> NDArray[np.float64]:
         """Return the base frame's inverse (4, 4)."""
@@ -196,6 +230,10 @@ class Calibration(Document):
             for joint, (low, high), reading in zip(self.joints, self.range, readings, strict=True)
             if not low <= reading <= high
         ]
+
+    @cached_property
+    def _joint_corrections(self) -> Corrections:
+        return self.corrections.joint_corrections([joint.name for joint in self.joints])
 
     @cached_property
     def _links(self) -> list[int]:
@@ -220,11 +258,11 @@ class Calibration(Document):
         stated = self.covariance
         if stated is None:
             return [None] * len(self.cameras)
-        matrix = np.array(stated.matrix)
+        matrix, paths = np.array(stated.matrix), self._joint_corrections.paths()
         return [
             None
             if mount is None
-            else twist_covariance(self.chain, mount, index, link, stated.parameters, matrix)
+            else twist_covariance(self.chain, mount, index, link, paths, stated.parameters, matrix)
             for index, (mount, link) in enumerate(zip(self._mounts, self._links, strict=True))
         ]
 

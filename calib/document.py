@@ -17,6 +17,7 @@ from calib.calibration import (
 from calib.links import Links, based, links_of
 from calib.session import Session
 from calib.solution import Solution
+from calib.stated_corrections import stated_corrections
 from calib.transforms import inverse
 
 Method = Literal["ml", "closed_form"]
@@ -27,7 +28,7 @@ def document(session: Session, method: Method, solution: Solution, quality: Qual
     chain, links = solution.chain, links_of(solution.chain)
     if solution.world_from_base is not None:
         links = based(links, solution.world_from_base)
-    deviations = _deviations(solution)
+    deviations, names = _deviations(solution), [joint.name for joint in session.joints]
     ranges = session.with_views([view for view in session.views if view.use == "fit"]).readings()
     return Calibration(
         format=CALIBRATION_FORMAT,
@@ -50,7 +51,7 @@ def document(session: Session, method: Method, solution: Solution, quality: Qual
         ],
         world_from_base=links.world_from_base.tolist(),
         cameras=[_camera(session, index, solution, links) for index in range(len(session.cameras))],
-        corrections={},
+        corrections=stated_corrections(names, solution.corrections, solution.warp, deviations),
         range=[[float(lo), float(hi)] for lo, hi in zip(ranges.min(axis=0), ranges.max(axis=0), strict=True)],
         covariance=_covariance(solution),
         quality=quality,

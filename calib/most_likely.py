@@ -8,6 +8,7 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.corrections import Corrections, coefficient_paths
 from calib.likelihood.building import Start
 from calib.likelihood.document_covariance import document_jacobian
 from calib.likelihood.refinement import Refined, refine
@@ -16,17 +17,25 @@ from calib.observations import Observation
 from calib.residuals import read_as_predicted
 from calib.session import Session
 from calib.solution import Solution
+from calib.stated_corrections import warp_paths
 from calib.targets import NoTarget, Target
 
 Array = NDArray[np.float64]
 
 
-def most_likely(session: Session, observations: Sequence[Observation], start: Solution) -> Solution:
-    """Return the most likely solution near the closed form's, with its covariance and what did not belong."""
+def most_likely(
+    session: Session, observations: Sequence[Observation], start: Solution, target_warp: bool = False
+) -> Solution:
+    """Return the most likely solution near the closed form's, with its covariance and what did not belong.
+
+    Imperfect joints are corrected where the data support it, and with `target_warp` the target's bulge.
+    """
     assert start.mounts is not None
     oriented = _as_the_chain_has_it(session, start, observations)
-    refined = refine(session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior))
-    state, aside = refined.state, refined.set_aside
+    refined = refine(
+        session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior), target_warp
+    )
+    state, aside, found = refined.state, refined.set_aside, refined.imperfections
     # A prismatic axis may lie anywhere: through cameras[0]'s centre is the convention.
     chain = state.chain
     feet = chain.points - (chain.points * chain.axes).sum(axis=1, keepdims=True) * chain.axes
@@ -40,6 +49,8 @@ def most_likely(session: Session, observations: Sequence[Observation], start: So
         left_out=(aside.views, aside.points),
         held_out=refined.held_out,
         weaknesses=weaknesses(session, refined.problem, refined.weights, refined.descent, refined.noise**2),
+        corrections=Corrections(found.models, state.corrections),
+        warp=dict(zip(found.warp, state.warp.tolist(), strict=True)),
     )
 
 
@@ -60,7 +71,9 @@ def _as_the_chain_has_it(
 
 def _document_covariance(session: Session, refined: Refined) -> tuple[list[str], Array]:
     models = [None if lens is None else lens.model for lens in refined.lenses()]
-    names, jacobian = document_jacobian(refined.state, refined.problem.layout, models)
+    found = refined.imperfections
+    paths = [*coefficient_paths(found.models), *warp_paths(len(found.warp))]
+    names, jacobian = document_jacobian(refined.state, refined.problem.layout, models, paths)
     covariance = jacobian @ refined.covariance @ jacobian.T
     # A print that is larger than it says scales every length, and shows in no residual.
     size = _lengths(names, refined) * _print_scale_std(session.target)
@@ -81,6 +94,8 @@ def _lengths(names: list[str], refined: Refined) -> Array:
     for camera, mount in enumerate(state.mounts):
         for i in range(3):
             values[place[f"cameras.{camera}.world_from_camera.{i}.3"]] = mount[i, 3]
+    for path, height in zip(warp_paths(len(state.warp)), state.warp, strict=True):
+        values[place[path]] = height
     return values
 
 

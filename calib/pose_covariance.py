@@ -18,20 +18,42 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class TwistCovariance:
-    """The covariance (q, q) of one camera's chain: for each joint a twist and its relative scale, the mount's twist."""
+    """The covariance (q, q) of one camera's chain.
+
+    Of each joint a twist and its relative scale, of the mount its twist, and the coefficients of the corrections.
+    """
 
     matrix: Array
 
 
+@dataclass(frozen=True, eq=False)
+class CorrectedReadings:
+    """Readings as the chain takes them: `values` (n, m), with how much of each correction is in them (n, m, k).
+
+    `std` (n, m) is what is not known of them, such as the side they were approached from.
+    """
+
+    values: Array
+    regressors: Array
+    std: Array
+
+
 def twist_covariance(
-    chain: Chain, mount: Array, camera: int, link: int, parameters: Sequence[str], matrix: Array
+    chain: Chain,
+    mount: Array,
+    camera: int,
+    link: int,
+    corrections: Sequence[str],
+    parameters: Sequence[str],
+    matrix: Array,
 ) -> TwistCovariance:
     """Return what the document's covariance says of the first `link` joints and of the camera's mount (4, 4).
 
-    `matrix` (p, p) is that of the numbers called `parameters`, by their dotted paths in the document.
+    `matrix` (p, p) is that of the numbers called `parameters`, by their dotted paths in the document, `corrections` are
+    the paths of the corrections' coefficients.
     """
     place = {name: index for index, name in enumerate(parameters)}
-    jacobian = np.zeros((7 * link + 6, len(parameters)))
+    jacobian = np.zeros((7 * link + 6 + len(corrections), len(parameters)))
     for joint in range(link):
         rows = jacobian[7 * joint : 7 * joint + 7]
         axis, point = chain.axes[joint], chain.points[joint]
@@ -40,7 +62,8 @@ def twist_covariance(
         _put(rows[3:6], place, [f"joints.{joint}.axis.{i}" for i in range(3)], skew(point) @ turn)
         _put(rows[3:6], place, [f"joints.{joint}.point.{i}" for i in range(3)], np.eye(3))
         _put(rows[6:7], place, [f"joints.{joint}.scale"], np.array([[1 / chain.scales[joint]]]))
-    rows, back = jacobian[7 * link :], mount[:3, :3].T
+    _put(jacobian[7 * link + 6 :], place, corrections, np.eye(len(corrections)))
+    rows, back = jacobian[7 * link : 7 * link + 6], mount[:3, :3].T
     for column in range(3):
         names = [f"cameras.{camera}.world_from_camera.{row}.{column}" for row in range(3)]
         # omega is half the sum of e_c x (R' dR e_c) over the columns c.
@@ -49,24 +72,32 @@ def twist_covariance(
     return TwistCovariance(jacobian @ matrix @ jacobian.T)
 
 
-def _put(rows: Array, place: dict[str, int], names: list[str], values: Array) -> None:
+def _put(rows: Array, place: dict[str, int], names: Sequence[str], values: Array) -> None:
     for column, name in enumerate(names):
         if name in place:
             rows[:, place[name]] += values[:, column]
 
 
-def pose_covariances(chain: Chain, mount: Array, link: int, known: TwistCovariance, readings: Array) -> Array:
-    """Return the covariances (n, 6, 6) of the poses at `readings` (n, m) of a camera that `link` joints move."""
-    count = len(readings)
-    jacobian = np.zeros((count, 6, 7 * link + 6))
+def pose_covariances(
+    chain: Chain, mount: Array, link: int, known: TwistCovariance, readings: CorrectedReadings
+) -> Array:
+    """Return the covariances (n, 6, 6) of the poses at `readings` of a camera that `link` joints move."""
+    count = len(readings.values)
+    jacobian = np.zeros((count, 6, len(known.matrix)))
+    by_reading = np.zeros((count, 6, link))
     after = np.broadcast_to(inverse(mount), (count, 4, 4))
     carried = adjoint(after)
     for joint in reversed(range(link)):
-        before = after @ inverse(chain.motion(joint, readings[:, joint]))
+        before = after @ inverse(chain.motion(joint, readings.values[:, joint]))
         carried_before = adjoint(before)
         jacobian[:, :, 7 * joint : 7 * joint + 6] = carried_before - carried
-        turning = carried_before @ joint_screw(chain, joint)
-        jacobian[:, :, 7 * joint + 6] = turning * (chain.scales[joint] * readings[:, joint, None])
+        by_reading[:, :, joint] = carried_before @ joint_screw(chain, joint) * chain.scales[joint]
+        jacobian[:, :, 7 * joint + 6] = by_reading[:, :, joint] * readings.values[:, joint, None]
         after, carried = before, carried_before
-    jacobian[:, :, 7 * link :] = np.eye(6)
-    return np.asarray(jacobian @ known.matrix @ np.swapaxes(jacobian, 1, 2))
+    jacobian[:, :, 7 * link : 7 * link + 6] = np.eye(6)
+    jacobian[:, :, 7 * link + 6 :] = by_reading @ readings.regressors[:, :link]
+    covariances = jacobian @ known.matrix @ np.swapaxes(jacobian, 1, 2)
+    if readings.std.any():
+        unknown = by_reading * readings.std[:, None, :link]
+        covariances = covariances + unknown @ np.swapaxes(unknown, 1, 2)
+    return np.asarray(covariances)

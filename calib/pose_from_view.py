@@ -11,6 +11,9 @@ from calib.transforms import inverse, transform
 
 Array = NDArray[np.float64]
 
+NEARLY_FLAT = 0.02
+"""How far points may lie out of a plane, over its size, to be taken for it first."""
+
 
 def pose_from_view(world: ArrayLike, pixels: ArrayLike, lens: Intrinsics) -> Array:
     """Return world_from_camera (4, 4) that best explains points `world` (n, 3) in m seen at `pixels` (n, 2).
@@ -35,9 +38,11 @@ def pose_from_view(world: ArrayLike, pixels: ArrayLike, lens: Intrinsics) -> Arr
 
 
 def _guesses(world: Array, flat: Array) -> list[tuple[Array, Array]]:
-    coplanar = np.abs(world[:, 2]).max() < 1e-9
-    method = cv2.SOLVEPNP_IPPE if coplanar else cv2.SOLVEPNP_SQPNP
-    count, rotations, translations, _ = cv2.solvePnPGeneric(world, flat, np.eye(3), None, flags=method)
+    # A plate that bulges has the two poses of a plane, from which each is refined with the bulge.
+    nearly_flat = np.abs(world[:, 2]).max() <= NEARLY_FLAT * np.ptp(world[:, :2])
+    method = cv2.SOLVEPNP_IPPE if nearly_flat else cv2.SOLVEPNP_SQPNP
+    points = world * [1, 1, 0] if nearly_flat else world
+    count, rotations, translations, _ = cv2.solvePnPGeneric(points, flat, np.eye(3), None, flags=method)
     if count == 0:
         raise UnsolvableError(
             "no camera pose explains where the target's points are seen: are their ids right?"

@@ -90,7 +90,8 @@ def _of_poses(
         assert observation.pose is not None
         predicted, measured = observation.pose, None
         if calibration.joints:
-            predicted = calibration.world_from_camera(session.views[observation.view].readings, camera)
+            view = session.views[observation.view]
+            predicted = calibration.world_from_camera(view.readings, camera, view.approached)
             measured = observation.pose
         residuals.append(ViewResidual(observation.view, None, predicted, measured))
     return residuals
@@ -100,40 +101,44 @@ def _of_points(
     calibration: Calibration, session: Session, camera: str, seen: Sequence[Observation], measure_pose: bool
 ) -> list[ViewResidual]:
     """Return the residuals of views of one camera, one or more, in which points are seen."""
-    target, lens = session.target, calibration.cameras[calibration.camera_index(camera)].intrinsics
+    target, points = session.target, calibration.points_of(session.target)
+    lens = calibration.cameras[calibration.camera_index(camera)].intrinsics
     if lens is None:
         raise CalibError(f"the calibration knows no lens of camera '{camera}': its pictures cannot be judged")
     if calibration.joints:
-        readings = [session.views[observation.view].readings for observation in seen]
-        predicted = calibration.world_from_camera(readings, camera)
+        views = [observation.view for observation in seen]
+        predicted = calibration.world_from_camera(session.readings()[views], camera, session.sides()[views])
         seen = read_as_predicted(seen, target, lens, predicted)
     else:
-        predicted = np.array([measured_pose(observation, target, lens) for observation in seen])
-    pixels = misfits(seen, target, lens, predicted)
+        predicted = np.array([measured_pose(observation, target, points, lens) for observation in seen])
+    pixels = misfits(seen, target, points, lens, predicted)
     return [
         ViewResidual(
             observation.view,
             pixels[row],
             predicted[row],
-            measured_pose(observation, target, lens) if measure_pose and calibration.joints else None,
+            measured_pose(observation, target, points, lens) if measure_pose and calibration.joints else None,
         )
         for row, observation in enumerate(seen)
     ]
 
 
 def misfits(
-    observations: Sequence[Observation], target: Target, lens: Intrinsics, poses: Array
+    observations: Sequence[Observation], target: Target, points: Array, lens: Intrinsics, poses: Array
 ) -> list[Array]:
-    """Return by how much a camera at `poses` (n, 4, 4) has each view's points (q, 2) elsewhere than measured, in px."""
-    seen = point_views(observations, target_points(target))
+    """Return by how much a camera at `poses` (n, 4, 4) has each view's points (q, 2) elsewhere than measured, in px.
+
+    `points` (t, 3) are where the target's are in the world (m).
+    """
+    seen = point_views(observations, points)
     pixels = _projected(seen.world, poses, lens) + disk_offsets(seen, poses, lens, disk_diameter(target))
     away = pixels - seen.pixels
     return [away[row, : len(observation.ids)] for row, observation in enumerate(observations)]
 
 
-def measured_pose(observation: Observation, target: Target, lens: Intrinsics) -> Array:
-    """Return the camera's pose (4, 4) by this view alone."""
-    world = target_points(target)[observation.ids]
+def measured_pose(observation: Observation, target: Target, points: Array, lens: Intrinsics) -> Array:
+    """Return the camera's pose (4, 4) by this view alone; `points` (t, 3) are where the target's are (m)."""
+    world = points[observation.ids]
     pose = pose_from_view(world, observation.pixels, lens)
     diameter = disk_diameter(target)
     if observation.disk and diameter is not None:

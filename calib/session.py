@@ -231,6 +231,12 @@ class Session(Document):
         """Return the readings of all views (n, m)."""
         return np.array([view.readings for view in self.views], dtype=float).reshape(len(self.views), -1)
 
+    def sides(self) -> NDArray[np.float64]:
+        """Return from which side each joint came to each view's readings (n, m): +1, -1, or 0 where not known."""
+        nowhere = [0] * len(self.joints)
+        sides = np.array([view.approached or nowhere for view in self.views], dtype=float)
+        return sides.reshape(len(self.views), -1)
+
     @model_validator(mode="after")
     def _names_and_sizes_agree(self) -> Self:
         joints = [joint.name for joint in self.joints]

@@ -1,12 +1,13 @@
 """What a solver found, before it is written down."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import Chain
+from calib.corrections import NO_CORRECTIONS, Corrections
 from calib.likelihood.held_out import HeldOut
 from calib.likelihood.weakness import Weakness
 from calib.session import Intrinsics, WorldOrigin
@@ -21,7 +22,8 @@ class Solution:
     `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
     their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
     well each view is predicted by the fit of all others, `weaknesses` what the views leave in the dark. `prior` (k, k)
-    is what a nominal model knows of the chain, and `world_from_base` (4, 4) its base.
+    is what a nominal model knows of the chain, and `world_from_base` (4, 4) its base. `corrections` are what imperfect
+    joints add to their readings, and `warp` the height (m) of each shape of the target's.
     """
 
     chain: Chain
@@ -34,3 +36,5 @@ class Solution:
     weaknesses: Sequence[Weakness] = ()
     prior: Array | None = None
     world_from_base: Array | None = None
+    corrections: Corrections = NO_CORRECTIONS
+    warp: dict[str, float] = field(default_factory=dict)

@@ -14,6 +14,8 @@ from calib.observations import Observation, Progress, observe
 from calib.quality import judged
 from calib.session import Session
 from calib.solution import Solution
+from calib.stated_corrections import corrections_in_words
+from calib.targets import target_points
 from calib.unfinished import finished_part
 
 
@@ -49,6 +51,8 @@ def solve(session: Session, method: Method = "ml", progress: Progress | None = N
     warnings += [*left_out_in_words(solution), *observed.missing]
     calibration = document(session, method, solution, Quality())
     quality = judged(calibration, session, observed.observations, solution.held_out, warnings)
+    corrected = corrections_in_words(calibration.corrections, session.joints, target_points(session.target))
+    quality = quality.model_copy(update={"corrections": corrected})
     return calibration.model_copy(update={"quality": quality})
 
 

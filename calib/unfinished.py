@@ -62,7 +62,8 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
 def _with_readings(view: View, done: Mask, names: list[str]) -> View:
     readings = [reading for reading, keep in zip(view.readings, done, strict=True) if keep]
     joint = view.joint if view.joint in names else None
-    return view.model_copy(update={"readings": readings, "joint": joint})
+    sides = view.approached and [side for side, keep in zip(view.approached, done, strict=True) if keep]
+    return view.model_copy(update={"readings": readings, "joint": joint, "approached": sides})
 
 
 def _reduced_origin(origin: WorldOrigin, done: Mask) -> WorldOrigin:

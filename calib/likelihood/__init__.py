@@ -11,6 +11,7 @@
     descent              Levenberg and Marquardt's way down
     outliers             what does not belong
     noise                how noisy points and poses are;  reading_noise  how noisy readings
+    imperfections        what joints and target may be off by, and what knowing it would gain;  selection  what is kept
     refinement           all of it in turn, until nothing changes
     uncertainty          the covariance;  document_covariance  in the document's own numbers
     quantities           what a person asks about;  weakness  what of it the views do not tell

@@ -12,8 +12,13 @@ from calib.twists import skew
 Array = NDArray[np.float64]
 
 
-def document_jacobian(state: State, layout: Layout, models: Sequence[str | None]) -> tuple[list[str], Array]:
-    """Return the dotted paths of a calibration's numbers, and their derivatives (d, p) by the parameters."""
+def document_jacobian(
+    state: State, layout: Layout, models: Sequence[str | None], corrections: Sequence[str] = ()
+) -> tuple[list[str], Array]:
+    """Return the dotted paths of a calibration's numbers, and their derivatives (d, p) by the parameters.
+
+    `corrections` are the paths of the readings' corrections and of the target's warp.
+    """
     names: list[str] = []
     rows: list[Array] = []
 
@@ -48,6 +53,7 @@ def document_jacobian(state: State, layout: Layout, models: Sequence[str | None]
             first, bends = ["fx", "fy", "cx", "cy"], range(len(by_lens) - 4)
             paths = first + [f"distortion.{i}" for i in bends]
             add([f"cameras.{camera}.intrinsics.{path}" for path in paths], by_lens)
+    add(list(corrections), np.eye(count)[layout.corrections.start : layout.warp.stop])
     return names, np.array(rows)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from calib.likelihood.building import Start, built
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
+from calib.likelihood.imperfections import Fit, Imperfections
 from calib.likelihood.lens_terms import lens_from_vector
 from calib.likelihood.noise import seen_noise
 from calib.likelihood.outliers import (
@@ -24,6 +25,7 @@ from calib.likelihood.problem import (
     all_in,
     evaluate,
 )
+from calib.likelihood.selection import selected
 from calib.likelihood.state import State
 from calib.likelihood.uncertainty import noise_variance, step_covariance
 from calib.observations import Observation
@@ -50,6 +52,7 @@ class Refined:
     noise: float
     set_aside: SetAside
     held_out: list[HeldOut]
+    imperfections: Imperfections
 
     @property
     def state(self) -> State:
@@ -65,19 +68,26 @@ class Refined:
         ]
 
 
-def refine(session: Session, observations: Sequence[Observation], start: Start) -> Refined:
-    """Return the most likely calibration near `start`, from the observations of the session's fit views."""
-    problem, estimate = built(session, observations, start)
+def refine(
+    session: Session, observations: Sequence[Observation], start: Start, target_warp: bool = False
+) -> Refined:
+    """Return the most likely calibration near `start`, from the observations of the session's fit views.
+
+    With `target_warp` the target may bulge, if the data support it.
+    """
     unknown = np.array([joint.reading_std is None for joint in session.joints], dtype=bool)
-    problem, estimate, weights, aside = _approached(problem, estimate)
-    for _ in range(MOST_PASSES):
-        descent = descend(problem, estimate, weights)
-        estimate = descent.estimate
-        problem, found, settled = seen_noise(problem, estimate, weights, unknown)
-        weights, newly = judged(problem, found)
-        if settled and newly == aside:
-            break
-        aside = newly
+
+    def refit(problem: Problem, estimate: Estimate) -> Fit:
+        return _settled(problem, estimate, unknown)
+
+    found = selected(session, refit(*built(session, observations, start)), refit, target_warp)
+    problem, weights, aside, descent = (
+        found.fit.problem,
+        found.fit.weights,
+        found.fit.aside,
+        found.fit.descent,
+    )
+    estimate = descent.estimate
     noise = noise_variance(problem, descent, weights)
     covariance = step_covariance(problem, descent, noise)
     as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
@@ -89,7 +99,26 @@ def refine(session: Session, observations: Sequence[Observation], start: Start) 
         evaluate(problem, as_read, weights),
         descent.equations.information,
     )
-    return Refined(problem, weights, descent, covariance, float(np.sqrt(noise)), aside, predicted)
+    return Refined(
+        problem, weights, descent, covariance, float(np.sqrt(noise)), aside, predicted, found.imperfections
+    )
+
+
+def _settled(problem: Problem, estimate: Estimate, unknown: NDArray[np.bool_]) -> Fit:
+    """Return the fit from an estimate when neither noise nor outliers change any more.
+
+    `unknown` (m,) tells the joints whose readings' noise nobody said.
+    """
+    problem, estimate, weights, aside = _approached(problem, estimate)
+    for _ in range(MOST_PASSES):
+        descent = descend(problem, estimate, weights)
+        estimate = descent.estimate
+        problem, found, settled = seen_noise(problem, estimate, weights, unknown)
+        weights, newly = judged(problem, found)
+        if settled and newly == aside:
+            break
+        aside = newly
+    return Fit(problem, weights, aside, descent)
 
 
 def _approached(problem: Problem, estimate: Estimate) -> tuple[Problem, Estimate, Weights, SetAside]:

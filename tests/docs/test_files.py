@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from calib import Calibration, load_calibration, load_session, solve
+from calib import Calibration, load_calibration, load_session, solve, stated_corrections
 from calib import calibration as calib_file
 from calib import session as calib_session
 from daemon.profile import load_profile, tables
@@ -50,6 +50,11 @@ MODELS: dict[str, type[BaseModel]] = {
     "### A joint's screw": calib_file.JointScrew,
     "### A D-H row": calib_file.DhLink,
     "### A calibrated camera": calib_file.CalibratedCamera,
+    "### Corrections": stated_corrections.StatedCorrections,
+    "### Backlash": stated_corrections.StatedBacklash,
+    "### Once per turn": stated_corrections.StatedOncePerTurn,
+    "### Coupling": stated_corrections.StatedCoupling,
+    "### Target warp": stated_corrections.TargetWarp,
     "### Covariance": calib_file.Covariance,
     "### Quality": calib_file.Quality,
     "### A view's quality": calib_file.ViewQuality,

@@ -1,15 +1,25 @@
 """Every derivative of the likelihood, against differences of the functions themselves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.random_rigs import looking_rig, noisy_session
 from calib.chain import Chain
+from calib.corrections import Backlash, Coupling, OncePerTurn
+from calib.first_solution import camera_views, first_solution
 from calib.lens import project_points
 from calib.likelihood.blocks import pose_residuals
+from calib.likelihood.building import Start, built
 from calib.likelihood.chain_terms import chain_terms
 from calib.likelihood.document_covariance import document_jacobian
+from calib.likelihood.imperfections import Circumstances, Imperfections, with_imperfections
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector, pixel_terms
+from calib.likelihood.normal import normal_equations
+from calib.likelihood.problem import Estimate, all_in, evaluate
 from calib.likelihood.state import Layout, State
+from calib.observations import observe
 from calib.session import Intrinsics
 from calib.transforms import inverse, rotation_log
 from calib.twists import exp_twist
@@ -21,6 +31,12 @@ LENSES = [
     Intrinsics(model="division", fx=800, fy=810, cx=320, cy=240, distortion=[-0.2]),
 ]
 STEP = 1e-6
+PATHS = [
+    "corrections.backlash.0.half_gap",
+    "corrections.once_per_turn.0.sine",
+    "corrections.target_warp.heights.0",
+    "corrections.target_warp.heights.1",
+]
 
 
 @pytest.mark.parametrize("lens", LENSES, ids=["opencv", "division"])
@@ -43,8 +59,9 @@ def some_state() -> tuple[State, Layout, np.ndarray, np.ndarray]:
     rig = random_rig(rng, ["revolute", "prismatic", "revolute"], ["skew", "parallel"])
     chain = Chain.of(rig.kinds, rig.axes, rig.points, rig.scales)
     lens = lens_vector(LENSES[0])
-    state = State(chain, rig.mount[None], (lens,), np.array([1e-4, -2e-4]), np.zeros(0))
-    layout = Layout.of(state, ["a", "b", "c"], ["main"], ["opencv"], ["backlash", "eccentricity"])
+    state = State(chain, rig.mount[None], (lens,), np.array([1e-4, -2e-4]), np.array([3e-4, -2e-4]))
+    corrections, warp = ["backlash", "eccentricity"], ["xx", "xy"]
+    layout = Layout.of(state, ["a", "b", "c"], ["main"], ["opencv"], corrections, warp)
     readings = rng.uniform(-1, 1, (6, 3)) / rig.scales
     return state, layout, readings, rng.normal(size=(6, 3, 2))
 
@@ -108,12 +125,12 @@ def document_numbers(state: State) -> dict[str, float]:
         numbers[f"cameras.0.intrinsics.{name}"] = value
     for i, value in enumerate(lens[4:]):
         numbers[f"cameras.0.intrinsics.distortion.{i}"] = value
-    return numbers
+    return numbers | dict(zip(PATHS, [*state.corrections, *state.warp], strict=True))
 
 
 def test_document_by_every_parameter() -> None:
     state, layout, _, _ = some_state()
-    names, jacobian = document_jacobian(state, layout, ["opencv"])
+    names, jacobian = document_jacobian(state, layout, ["opencv"], PATHS)
     assert set(names) == set(document_numbers(state))
     for k, step in enumerate(STEP * np.eye(len(layout))):
         there, back = (
@@ -133,3 +150,30 @@ def test_a_finite_twist_is_the_matrix_exponential() -> None:
         generator[:3, :3] = np.cross(np.eye(3), twist[:3])
         generator[:3, 3] = twist[3:]
         assert np.allclose(exp_twist(twist), expm(generator), atol=1e-14)
+
+
+def test_the_gradient_is_that_of_the_likelihood() -> None:
+    """Of every parameter, the corrections' coefficients and the warp's heights among them."""
+    session = noisy_session(looking_rig(np.random.default_rng(0), 3), np.random.default_rng(1))
+    sides = np.where(RNG.uniform(size=(len(session.views), 3)) < 0.5, -1.0, 1.0)
+    found = observe(session).observations
+    first = first_solution(session, found, camera_views(session, found))
+    assert first.mounts is not None
+    about = replace(Circumstances.of(session), sides=sides)
+    wanted = Imperfections((Backlash(0), OncePerTurn(1, 350.0), Coupling(2, 0)), ("xx", "xy", "yyy"))
+    start = built(session, found, Start(first.chain, first.mounts, first.lenses))
+    problem, estimate = with_imperfections(*start, about, Imperfections(), wanted)
+    weights, size = all_in(problem), len(problem.layout)
+
+    def moved(step: np.ndarray) -> Estimate:
+        return replace(estimate, state=estimate.state.moved(step, problem.layout))
+
+    away = np.zeros(size)
+    away[problem.layout.corrections.start :] = 1e-3 * RNG.normal(size=7)
+    estimate = moved(away)
+    equations = normal_equations(problem, estimate, evaluate(problem, estimate, weights))
+    for k, unit in enumerate(np.eye(size)):
+        step = 1e-4 / np.sqrt(equations.information[k, k]) * unit
+        costs = [evaluate(problem, moved(sign * step), weights).cost for sign in (1, -1)]
+        difference = (costs[0] - costs[1]) / (4 * step[k])
+        assert equations.gradient[k] == pytest.approx(difference, rel=1e-4), problem.layout.names[k]

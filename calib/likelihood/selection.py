@@ -1,0 +1,153 @@
+"""Which imperfections the data support: fitted for good one after the other, and kept where the likelihood pays.
+
+A correction of k coefficients is kept when it gains more in twice the log-likelihood than the extended BIC asks for:
+k log n, and 2 log c for having been chosen among c. Likelihoods are compared with
+
+    readings as noisy as each fit sees them: an error that is explained is no longer noise;
+    a view that does not belong costing as much as one that just does, so that setting it aside gains nothing;
+    gains over the spread that remains where the chain is never as good as its pictures.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from calib.likelihood.descent import count_measurements
+from calib.likelihood.imperfections import (
+    Candidate,
+    Circumstances,
+    Fit,
+    Imperfections,
+    promised,
+    with_imperfections,
+    worths,
+)
+from calib.likelihood.measurements import PointViews
+from calib.likelihood.outliers import MEDIAN_OF_SIX, RARE, STUDENT
+from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
+from calib.session import Session
+
+Array = NDArray[np.float64]
+Refit = Callable[[Problem, Estimate], Fit]
+
+MOST_TRIES = 3
+MOST_ROUNDS = 12
+BELONGS = float(chi2.isf(RARE, 6))
+"""The squared distance beyond which a view does not belong."""
+HINT = 4.0
+"""What a coefficient must promise where readings count as noisy: noise hides most of what it would gain."""
+
+
+@dataclass(frozen=True, eq=False)
+class Selected:
+    """The fit with the imperfections that the data support."""
+
+    fit: Fit
+    imperfections: Imperfections
+
+
+def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Selected:
+    """Return the fit with the imperfections that the data support, the target's warp only where asked for.
+
+    `refit` fits a problem from an estimate until nothing changes.
+    """
+    about, has = Circumstances.of(session), Imperfections()
+    given = np.array([joint.reading_std or 0.0 for joint in session.joints])
+    for _ in range(MOST_ROUNDS):
+        candidates = [c for c in promised(fit, about, has) if target_warp or c.imperfections.warp == has.warp]
+        price = _price(fit, len(candidates))
+        if weak := [kept for kept in worths(fit, has) if kept.gain <= price(kept)]:
+            fit, has = _without(fit, refit, about, has, weak[-1].imperfections), weak[-1].imperfections
+            continue
+        for candidate in _promising(candidates, price, noisy=bool((fit.problem.reading_std != given).any())):
+            wanted = candidate.imperfections
+            problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, about, has, wanted)
+            trial = refit(replace(problem, reading_std=given), _as_read(estimate))
+            worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
+            if min([gained(fit, trial), *worth]) <= price(candidate):
+                continue
+            # It may be the way there that gained: then it is open without the correction, too.
+            plain = _without(trial, refit, about, wanted, has)
+            fit, has = (trial, wanted) if gained(plain, trial) > price(candidate) else (plain, has)
+            break
+        else:
+            break
+    return Selected(fit, has)
+
+
+def _without(fit: Fit, refit: Refit, about: Circumstances, has: Imperfections, wanted: Imperfections) -> Fit:
+    """Return the fit with less than it `has`, from where it is."""
+    return refit(*with_imperfections(fit.problem, fit.descent.estimate, about, has, wanted))
+
+
+def _price(fit: Fit, candidates: int) -> Callable[[Candidate], float]:
+    """Return what a candidate must gain, as a function of it."""
+    measurements = count_measurements(fit.problem, fit.weights)
+    return lambda candidate: float(candidate.size * np.log(measurements) + 2 * np.log(max(candidates, 1)))
+
+
+def _promising(
+    candidates: list[Candidate], price: Callable[[Candidate], float], noisy: bool
+) -> list[Candidate]:
+    """Return the candidates that promise enough to be fitted, where readings count as `noisy` or not."""
+    enough = [c for c in candidates if c.gain > (HINT * c.size if noisy else price(c) / 2)]
+    return enough[:MOST_TRIES]
+
+
+def _as_read(estimate: Estimate) -> Estimate:
+    """Return the estimate with readings taken as they were read."""
+    return replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
+
+
+def gained(before: Fit, after: Fit) -> float:
+    """Return what `after` gains over `before` in twice the log-likelihood, in units of the spread that it leaves."""
+    # Both in the same units of noise: those of before, which count no more than they should.
+    groups = before.problem.groups
+    weights = _without_bad_points(after)
+    old, _ = _deviance(before.problem, before, weights)
+    new, spread = _deviance(replace(after.problem, groups=groups), after, weights)
+    return (old - new) / spread
+
+
+def _without_bad_points(fit: Fit) -> Weights:
+    """Return weights with which all views count, without the points that the fit set aside."""
+    bad = set(fit.aside.points)
+    groups = []
+    for group, weight in zip(fit.problem.groups, all_in(fit.problem).groups, strict=True):
+        if isinstance(group.data, PointViews) and bad:
+            pairs = zip(np.repeat(group.data.views, weight.shape[1]), group.data.ids.ravel(), strict=True)
+            wrong = np.array([(int(view), int(point)) in bad for view, point in pairs]).reshape(weight.shape)
+            groups.append(np.where(wrong, 0.0, weight))
+        else:
+            groups.append(weight)
+    return Weights(tuple(groups))
+
+
+def _deviance(problem: Problem, fit: Fit, weights: Weights) -> tuple[float, float]:
+    """Return minus twice the log-likelihood with the reading errors integrated out, and how far views spread.
+
+    The spread is the median squared distance of views over what it is for noise alone, and at least 1.
+    """
+    estimate = fit.descent.estimate
+    as_read = _as_read(estimate)
+    there = evaluate(problem, as_read, weights)
+    total, distances = float(estimate.travel @ problem.prior @ estimate.travel), []
+    for group, terms in zip(problem.groups, there.terms, strict=True):
+        hessian, gradient = terms.blocks.hessian[:, :6, :6], terms.blocks.gradient[:, :6]
+        away = (gradient * np.linalg.solve(hessian, gradient[..., None])[..., 0]).sum(axis=1)
+        spread = terms.chain.by_reading * problem.reading_std
+        transposed = np.swapaxes(spread, 1, 2)
+        noise = transposed @ hessian @ spread + np.eye(spread.shape[2])
+        pull = (transposed @ gradient[..., None])[..., 0]
+        distance = away - (pull * np.linalg.solve(noise, pull[..., None])[..., 0]).sum(axis=1)
+        freed = terms.blocks.cost - away
+        if isinstance(group.data, PointViews):
+            cost = np.minimum(distance, BELONGS)
+        else:
+            cost = (STUDENT + 6) * np.log1p(distance / STUDENT)
+        total += float((freed + cost + np.linalg.slogdet(noise)[1]).sum())
+        distances.append(distance)
+    return total, max(1.0, float(np.median(np.concatenate(distances))) / MEDIAN_OF_SIX)

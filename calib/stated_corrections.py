@@ -1,0 +1,178 @@
+"""The corrections as a calibration states them: by joint names, with standard deviations, in reading units."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from calib.corrections import Backlash, Corrections, Coupling, OncePerTurn
+from calib.session import Document, Joint, Number, Positive
+from calib.warp import warp_shapes
+
+Shape = Annotated[str, Field(pattern="^(xx|xy|yy|xxx|xxy|xyy|yyy)$")]
+
+
+class StatedBacklash(Document):
+    """Half the play of a joint: added to readings approached from below, subtracted from those from above."""
+
+    joint: str
+    half_gap: Number
+    half_gap_std: Number | None = None
+
+    def model(self, joints: Sequence[str]) -> Backlash:
+        """Return what it does to the readings of these joints."""
+        return Backlash(joints.index(self.joint))
+
+
+class StatedOncePerTurn(Document):
+    """What is added to a joint's reading v: cosine (cos a - 1) + sine sin a, with a = 2 pi v / turn."""
+
+    joint: str
+    turn: Positive
+    cosine: Number
+    sine: Number
+    cosine_std: Number | None = None
+    sine_std: Number | None = None
+
+    def model(self, joints: Sequence[str]) -> OncePerTurn:
+        """Return what it does to the readings of these joints."""
+        return OncePerTurn(joints.index(self.joint), self.turn)
+
+
+class StatedCoupling(Document):
+    """What part of the reading of the joint `by` is added to a joint's own."""
+
+    joint: str
+    by: str
+    factor: Number
+    factor_std: Number | None = None
+
+    def model(self, joints: Sequence[str]) -> Coupling:
+        """Return what it does to the readings of these joints."""
+        return Coupling(joints.index(self.joint), joints.index(self.by))
+
+
+class TargetWarp(Document):
+    """How far the target's points lie out of its mean plane, along the world's Z: `heights` (m) of unit `shapes`."""
+
+    shapes: list[Shape]
+    heights: list[Number]
+    heights_std: list[Number] | None = None
+
+    @model_validator(mode="after")
+    def _one_height_a_shape(self) -> Self:
+        if len(self.heights) != len(self.shapes):
+            raise ValueError(f"has {len(self.heights)} heights for {len(self.shapes)} shapes")
+        return self
+
+    def bulge(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how far each of the target's `points` (t, 3) lies out of the plane (t,)."""
+        return np.asarray(warp_shapes(points, self.shapes) @ np.array(self.heights, dtype=float))
+
+
+class StatedCorrections(Document):
+    """What the data supported beyond perfect joints and a flat target; empty where it was nothing."""
+
+    backlash: list[StatedBacklash] = Field(default_factory=list)
+    once_per_turn: list[StatedOncePerTurn] = Field(default_factory=list)
+    coupling: list[StatedCoupling] = Field(default_factory=list)
+    target_warp: TargetWarp | None = None
+
+    @model_serializer(mode="wrap")
+    def _what_there_is(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        written: dict[str, Any] = handler(self)
+        return {key: value for key, value in written.items() if value not in ([], None)}
+
+    def joint_names(self) -> list[str]:
+        """Return the names of the joints that these speak of."""
+        own = [one.joint for part in (self.backlash, self.once_per_turn, self.coupling) for one in part]
+        return own + [one.by for one in self.coupling]
+
+    def joint_corrections(self, joints: Sequence[str]) -> Corrections:
+        """Return what these do to the readings of `joints`; raises ValueError for a name that is not among them."""
+        stated: list[StatedBacklash | StatedOncePerTurn | StatedCoupling] = [
+            *self.backlash,
+            *self.once_per_turn,
+            *self.coupling,
+        ]
+        models = tuple(one.model(joints) for one in stated)
+        values = [
+            getattr(one, name)
+            for one, model in zip(stated, models, strict=True)
+            for name in model.coefficients
+        ]
+        return Corrections(models, np.array(values, dtype=float))
+
+
+def stated_corrections(
+    joints: Sequence[str],
+    corrections: Corrections,
+    warp: Mapping[str, float],
+    deviations: Mapping[str, float],
+) -> StatedCorrections:
+    """Return what a calibration states of `corrections` and of the target's `warp`, the height (m) of each shape.
+
+    `deviations` are the standard deviations of the calibration's numbers by their paths.
+    """
+    stated: dict[str, Any] = {}
+    values, paths = iter(corrections.coefficients.tolist()), iter(corrections.paths())
+    for model in corrections.models:
+        entry: dict[str, Any] = {"joint": joints[model.joint]}
+        if isinstance(model, OncePerTurn):
+            entry["turn"] = model.turn
+        if isinstance(model, Coupling):
+            entry["by"] = joints[model.by]
+        for name in model.coefficients:
+            entry |= {name: next(values), f"{name}_std": deviations.get(next(paths))}
+        stated.setdefault(model.kind, []).append(entry)
+    if warp:
+        stated["target_warp"] = {
+            "shapes": list(warp),
+            "heights": list(warp.values()),
+            "heights_std": [deviations[path] for path in warp_paths(len(warp)) if path in deviations] or None,
+        }
+    return StatedCorrections.model_validate(stated)
+
+
+def warp_paths(count: int) -> list[str]:
+    """Return the dotted paths in a calibration of the warp's heights."""
+    return [f"corrections.target_warp.heights.{index}" for index in range(count)]
+
+
+def corrections_in_words(
+    stated: StatedCorrections, joints: Sequence[Joint], points: NDArray[np.float64]
+) -> list[str]:
+    """Return a sentence for each correction; `points` (t, 3) are the flat target's."""
+    units, sentences = {joint.name: joint.reading_unit for joint in joints}, []
+    for gap in stated.backlash:
+        size = _size(2 * abs(gap.half_gap), 2 * (gap.half_gap_std or 0), units[gap.joint])
+        sentences.append(
+            f"{gap.joint}: backlash of {size} between the directions of approach, taken into account"
+        )
+    for wave in stated.once_per_turn:
+        height = float(np.hypot(wave.cosine, wave.sine))
+        deviation = float(np.hypot(wave.cosine_std or 0, wave.sine_std or 0))
+        size = _size(height, deviation, units[wave.joint])
+        sentences.append(
+            f"{wave.joint}: an error of up to {size} that returns every turn, taken into account"
+        )
+    for share in stated.coupling:
+        size = _size(share.factor, share.factor_std or 0, units[share.joint])
+        sentences.append(
+            f"{share.joint}: moves by {size} with each {units[share.by]} of {share.by}, taken into account"
+        )
+    if stated.target_warp is not None:
+        bulge = 1e3 * float(np.ptp(stated.target_warp.bulge(points)))
+        deviation = 1e3 * max(stated.target_warp.heights_std or [0.0])
+        sentences.append(f"the target is {_size(bulge, deviation, 'mm')} from flat, taken into account")
+    return sentences
+
+
+def _size(value: float, deviation: float, unit: str) -> str:
+    """Return a value with its standard deviation, as many digits of either as mean anything."""
+    if deviation <= 0:
+        return f"{value:.3g} {unit}"
+    decimals = max(0, 1 - int(np.floor(np.log10(deviation))))
+    return f"{value:.{decimals}f} {unit} (+-{deviation:.{decimals}f})"
