@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 MOST_STEPS = 50
 CONVERGED = 1e-3
 """What a further step would gain, in units of one measurement's mean cost, below which it is not taken."""
+HELD_PX = 1e-4
+"""By how much what centroids of disks are off by may be out of date."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ def adjust(
     values = lens_vector(lens)
     offsets = disk_offsets(seen, poses, lens, disk_diameter)
     blocks = _blocks(seen, poses, values, lens, offsets)
-    damping, growth = 1e-4, 4.0
+    damping, growth = 1e-6, 4.0
     measurements = 2 * float(seen.present.sum())
     for _ in range(MOST_STEPS):
         step, twists, gain = _step(blocks, free, damping)
@@ -45,13 +47,14 @@ def adjust(
             if damping > 1e12:
                 break
             continue
-        poses, values = moved
+        (poses, values), blocks = moved, there
         damping, growth = max(damping / 10, 1e-12), 4.0
         if gain <= CONVERGED * there.cost.sum() / measurements:
-            blocks = there
-            break
-        offsets = disk_offsets(seen, poses, lens_from_vector(values, lens), disk_diameter)
-        blocks = _blocks(seen, poses, values, lens, offsets) if seen.disk.any() else there
+            renewed = disk_offsets(seen, poses, lens_from_vector(values, lens), disk_diameter)
+            if np.nanmax(np.abs(renewed - offsets), initial=0) < HELD_PX:
+                break
+            offsets = renewed
+            blocks = _blocks(seen, poses, values, lens, offsets)
     variance = float(blocks.cost.sum()) / max(measurements - 6 * len(poses) - int(free.sum()), 1)
     information, _, _ = _reduced(blocks, 0.0)
     covariance = np.zeros_like(information)

@@ -13,8 +13,13 @@ Array = NDArray[np.float64]
 
 MOST_STEPS = 60
 MOST_ROUNDS = 5
-CONVERGED = 1e-4
-"""What a step gains in twice the log-likelihood below which a round is over: a hundredth of a standard deviation."""
+CONVERGED = 1e-3
+"""What a step gains in twice the log-likelihood below which a round is over: the next one gains far less."""
+NOTHING = 1e-6
+"""What a step must promise to be taken at all: a thousandth of a standard deviation."""
+MOST_DAMPING = 1e12
+HELD_PX = 1e-4
+"""By how much what centroids of disks are off by may be out of date."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,40 +37,39 @@ def descend(problem: Problem, start: Estimate, weights: Weights) -> Descent:
 
     What centroids of disks are off by is held while going down, and taken anew until it no longer matters.
     """
-    estimate = start
+    descent = _round(problem, start, weights)
     for _ in range(MOST_ROUNDS):
-        estimate, evaluation, converged = _round(problem, estimate, weights)
-        renewed = offsets_at(problem, estimate)
-        if all(_close(old, new) for old, new in zip(estimate.offsets, renewed, strict=True)):
+        held, renewed = descent.estimate.offsets, offsets_at(problem, descent.estimate)
+        if all(_close(old, new) for old, new in zip(held, renewed, strict=True)):
             break
-        estimate = replace(estimate, offsets=renewed)
-    return Descent(estimate, evaluation, normal_equations(problem, estimate, evaluation), converged)
+        descent = _round(problem, replace(descent.estimate, offsets=renewed), weights)
+    return descent
 
 
 def _close(old: Array | None, new: Array | None) -> bool:
-    return old is None or new is None or bool(np.nanmax(np.abs(old - new), initial=0) < 1e-4)
+    return old is None or new is None or bool(np.nanmax(np.abs(old - new), initial=0) < HELD_PX)
 
 
-def _round(problem: Problem, estimate: Estimate, weights: Weights) -> tuple[Estimate, Evaluation, bool]:
+def _round(problem: Problem, estimate: Estimate, weights: Weights) -> Descent:
     evaluation = evaluate(problem, estimate, weights)
+    equations = normal_equations(problem, estimate, evaluation)
     damping, growth = 1e-6, 4.0
     for _ in range(MOST_STEPS):
-        equations = normal_equations(problem, estimate, evaluation)
-        while True:
-            step = solve_damped(equations, problem.free, damping)
-            candidate = stepped(problem, estimate, equations, step)
-            there = evaluate(problem, candidate, weights)
-            if there.cost <= evaluation.cost:
-                break
+        step = solve_damped(equations, problem.free, damping)
+        gain = sum(each.gain for each in equations.eliminations) - float(step @ equations.gradient)
+        if gain <= NOTHING or damping > MOST_DAMPING:
+            return Descent(estimate, evaluation, equations, converged=True)
+        candidate = stepped(problem, estimate, equations, step)
+        there = evaluate(problem, candidate, weights)
+        if not there.cost <= evaluation.cost:
             damping, growth = damping * growth, growth * 2
-            if damping > 1e12:
-                return estimate, evaluation, True
-        gain = -float(step @ equations.gradient)
+            continue
         estimate, evaluation = candidate, there
+        equations = normal_equations(problem, estimate, evaluation)
         damping, growth = max(damping / 10, 1e-12), 4.0
         if gain <= CONVERGED:
-            return estimate, evaluation, True
-    return estimate, evaluation, False
+            return Descent(estimate, evaluation, equations, converged=True)
+    return Descent(estimate, evaluation, equations, converged=False)
 
 
 def count_measurements(problem: Problem, weights: Weights) -> int:

@@ -15,12 +15,13 @@ Array = NDArray[np.float64]
 class Elimination:
     """A group's reading errors in terms of a step of the parameters: `offset` (n, j) + `slope` (n, j, p) step.
 
-    j counts the noisy joints.
+    j counts the noisy joints; `gain` is what the offset alone gains in twice the log-likelihood.
     """
 
     views: NDArray[np.intp]
     offset: Array
     slope: Array
+    gain: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +40,10 @@ def normal_equations(problem: Problem, estimate: Estimate, evaluation: Evaluatio
     for group, terms in zip(problem.groups, evaluation.terms, strict=True):
         local = local_by_parameter(problem, group, terms)
         hessian, slope, elimination = without_reading_errors(problem, estimate, group, terms, local)
-        information += np.einsum("ndp,nde,neq->pq", local, hessian, local, optimize=True)
-        gradient += np.einsum("ndp,nd->p", local, slope)
+        # All views' rows together: one product of matrices.
+        rows = local.reshape(-1, local.shape[-1])
+        information += rows.T @ (hessian @ local).reshape(rows.shape)
+        gradient += slope.ravel() @ rows
         eliminations.append(elimination)
     return NormalEquations(information, gradient, tuple(eliminations))
 
@@ -67,7 +70,11 @@ def without_reading_errors(
     noisy = np.flatnonzero(problem.reading_std[: group.link] > 0)
     if not len(noisy):
         nothing = np.zeros((len(views), 0))
-        return hessian, gradient, Elimination(views, nothing, np.zeros((*nothing.shape, len(problem.layout))))
+        return (
+            hessian,
+            gradient,
+            Elimination(views, nothing, np.zeros((*nothing.shape, len(problem.layout))), 0.0),
+        )
     by_reading = terms.chain.by_reading[:, :, noisy]
     precision = problem.reading_std[noisy] ** -2.0
     transposed = np.swapaxes(by_reading, 1, 2)
@@ -78,4 +85,8 @@ def without_reading_errors(
     offset = -np.linalg.solve(own, pull[..., None])[..., 0]
     reduced = hessian - mixed @ gain
     slope = gradient + (mixed @ offset[..., None])[..., 0]
-    return reduced, slope, Elimination(views, np.asarray(offset, float), -gain @ local)
+    return (
+        reduced,
+        slope,
+        Elimination(views, np.asarray(offset, float), -gain @ local, -float((offset * pull).sum())),
+    )
