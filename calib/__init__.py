@@ -9,6 +9,7 @@ data flows through them:
 
     session, targets             what was measured, and of what;  documents, session_writer  on disk
     detection/, observations     the target's points in every picture
+    parameters, lens_prior, held_chain           what is known beforehand
     lens, disks, tsai            lens models;  homography, bundle, lens_calibration, pose_from_view  lens and poses
     transforms, twists, chain    rigid motions, and the chain as a product of exponentials
     sweeps, screws, closed_form  the paper's method;  orientation  of symmetric targets;  first_solution  all of it

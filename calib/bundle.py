@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.lens_prior import LensPrior
 from calib.likelihood.blocks import Blocks, disk_offsets, point_blocks
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector
 from calib.likelihood.measurements import PointViews
@@ -28,39 +29,46 @@ class Bundle:
     poses: Array
     covariance: Array
 
+    def focal_std(self) -> float:
+        """Return the standard deviation of the focal length, relative to it."""
+        return float(np.sqrt(self.covariance[0, 0])) / self.lens.fx
+
 
 def adjust(
-    seen: PointViews, lens: Intrinsics, poses: Array, free: NDArray[np.bool_], disk_diameter: float | None
+    seen: PointViews, lens: Intrinsics, poses: Array, prior: LensPrior, disk_diameter: float | None
 ) -> Bundle:
-    """Return the most likely lens and poses near these; `free` (l,) are the lens's numbers that may move."""
-    values = lens_vector(lens)
+    """Return the most likely lens and poses near these; `prior` says what of the lens may move, and how far."""
+    values = prior.imposed(lens_vector(lens))
+    lens = lens_from_vector(values, lens)
+    freedom = max(2 * float(seen.present.sum()) - 6 * len(poses) - int(prior.free.sum()), 1)
     offsets = disk_offsets(seen, poses, lens, disk_diameter)
     blocks = _blocks(seen, poses, values, lens, offsets)
     damping, growth = 1e-6, 4.0
-    measurements = 2 * float(seen.present.sum())
     for _ in range(MOST_STEPS):
-        step, twists, gain = _step(blocks, free, damping)
+        # How noisy the points are is not known: the prior is weighed by what they are seen to be here.
+        noise = float(blocks.cost.sum()) / freedom
+        step, twists, gain = _step(blocks, values, prior, noise, damping)
         moved = poses @ exp_twist(twists), values + step
         there = _blocks(seen, *moved, lens, offsets)
-        if not there.cost.sum() <= blocks.cost.sum():
+        cost = there.cost.sum() + noise * prior.misfit(moved[1])
+        if not cost <= blocks.cost.sum() + noise * prior.misfit(values):
             damping, growth = damping * growth, growth * 2
             if damping > 1e12:
                 break
             continue
         (poses, values), blocks = moved, there
         damping, growth = max(damping / 10, 1e-12), 4.0
-        if gain <= CONVERGED * there.cost.sum() / measurements:
+        if gain <= CONVERGED * cost / freedom:
             renewed = disk_offsets(seen, poses, lens_from_vector(values, lens), disk_diameter)
             if np.nanmax(np.abs(renewed - offsets), initial=0) < HELD_PX:
                 break
             offsets = renewed
             blocks = _blocks(seen, poses, values, lens, offsets)
-    variance = float(blocks.cost.sum()) / max(measurements - 6 * len(poses) - int(free.sum()), 1)
+    variance = float(blocks.cost.sum()) / freedom
     information, _, _ = _reduced(blocks, 0.0)
-    covariance = np.zeros_like(information)
-    covariance[np.ix_(free, free)] = variance * np.linalg.pinv(
-        information[np.ix_(free, free)], hermitian=True
-    )
+    by_step = prior.by_step()[:, prior.free]
+    information = by_step.T @ (information + variance * prior.information()) @ by_step
+    covariance = variance * by_step @ np.linalg.pinv(information, hermitian=True) @ by_step.T
     return Bundle(lens_from_vector(values, lens), poses, covariance)
 
 
@@ -85,14 +93,19 @@ def _reduced(blocks: Blocks, damping: float) -> tuple[Array, Array, tuple[Array,
     )
 
 
-def _step(blocks: Blocks, free: NDArray[np.bool_], damping: float) -> tuple[Array, Array, float]:
+def _step(
+    blocks: Blocks, values: Array, prior: LensPrior, noise: float, damping: float
+) -> tuple[Array, Array, float]:
     """Return the steps of the lens (l,) and of the poses (n, 6), and twice what they should gain."""
     information, gradient, (slope, offset) = _reduced(blocks, damping)
-    information = information[np.ix_(free, free)]
-    step = np.zeros(len(free))
+    pull = noise * prior.information() @ (values - prior.mean)
+    by_step = prior.by_step()[:, prior.free]
+    information = by_step.T @ (information + noise * prior.information()) @ by_step
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information * np.outer(scale, scale) + damping * np.eye(len(scale))
-    step[free] = -scale * np.linalg.lstsq(scaled, scale * gradient[free], rcond=1e-14)[0]
+    right = scale * (by_step.T @ (gradient + pull))
+    step = -by_step @ (scale * np.linalg.lstsq(scaled, right, rcond=1e-14)[0])
     twists = -offset - slope @ step
-    gain = -float(step @ blocks.gradient[:, 6:].sum(axis=0) + (twists * blocks.gradient[:, :6]).sum())
+    downhill = blocks.gradient[:, 6:].sum(axis=0) + pull
+    gain = -float(step @ downhill + (twists * blocks.gradient[:, :6]).sum())
     return step, twists, gain

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from calib.chain import Chain
 from calib.errors import UnsolvableError
+from calib.held_chain import held_chain
 from calib.screws import Screw, prismatic_screw, revolute_screw
 from calib.session import Session
 from calib.sweeps import readings_at_rest, sweep_labels
@@ -94,12 +95,13 @@ def mean_mount(chain: Chain, views: PoseViews, camera: int) -> Array:
 
 
 def _chain(session: Session, screws: Sequence[Screw]) -> Chain:
-    return Chain.of(
+    chain = Chain.of(
         [joint.kind for joint in session.joints[: len(screws)]],
         [screw.axis for screw in screws],
         [screw.point for screw in screws],
         [screw.scale for screw in screws],
     )
+    return held_chain(session, chain)
 
 
 def _too_few(name: str, count: int) -> str:

@@ -1,6 +1,6 @@
 """A solution written down as a calibration."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from calib.calibration import (
     JointScrew,
     Quality,
 )
+from calib.chain import Chain
 from calib.links import Links, based, links_of
 from calib.session import Session
 from calib.solution import Solution
@@ -25,7 +26,8 @@ Method = Literal["ml", "closed_form"]
 
 def document(session: Session, method: Method, solution: Solution, quality: Quality) -> Calibration:
     """Return the solution as a calibration document."""
-    chain, links = solution.chain, links_of(solution.chain)
+    chain = _with_conventional_points(solution)
+    links = links_of(chain)
     if solution.world_from_base is not None:
         links = based(links, solution.world_from_base)
     deviations, names = _deviations(solution), [joint.name for joint in session.joints]
@@ -58,6 +60,15 @@ def document(session: Session, method: Method, solution: Solution, quality: Qual
         target=session.target,
         origin=solution.origin,
     )
+
+
+def _with_conventional_points(solution: Solution) -> Chain:
+    """Return the chain with the points of its axes that the format asks for; any other would do as well."""
+    chain = solution.chain
+    if solution.mounts is None:
+        return chain
+    feet = chain.points - (chain.points * chain.axes).sum(axis=1, keepdims=True) * chain.axes
+    return replace(chain, points=np.where(chain.revolute[:, None], feet, solution.mounts[0, :3, 3]))
 
 
 def _camera(session: Session, index: int, solution: Solution, links: Links) -> CalibratedCamera:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from calib.closed_form import PoseViews, solve_chain
 from calib.errors import UnsolvableError
 from calib.lens import project_points
 from calib.lens_calibration import calibrate_camera
+from calib.lens_prior import lens_prior
 from calib.observations import Observation
 from calib.orientation import agreed, carried_on
 from calib.session import Camera, Intrinsics, Session, WorldOrigin
@@ -34,7 +36,7 @@ class CameraViews:
 
 
 def camera_views(session: Session, observations: Sequence[Observation]) -> CameraViews:
-    """Return the lens of each camera, unless it is known, and where it was in each view.
+    """Return the lens of each camera, as far as it is not known, and where it was in each view.
 
     Raises UnsolvableError that names the camera.
     """
@@ -49,7 +51,8 @@ def camera_views(session: Session, observations: Sequence[Observation]) -> Camer
         if own:
             views = [observations[i] for i in own]
             try:
-                found = calibrate_camera(points, views, _picture_size(camera), diameter, lens)
+                prior = partial(lens_prior, session, index)
+                found = calibrate_camera(points, views, _picture_size(camera), diameter, lens, prior)
             except UnsolvableError as error:
                 raise UnsolvableError(f"camera '{camera.name}': {error}") from error
             lens, poses[own], known_to = found.lens, found.poses, found.focal_std

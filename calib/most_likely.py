@@ -36,13 +36,9 @@ def most_likely(
         session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior), target_warp
     )
     state, aside, found = refined.state, refined.set_aside, refined.imperfections
-    # A prismatic axis may lie anywhere: through cameras[0]'s centre is the convention.
-    chain = state.chain
-    feet = chain.points - (chain.points * chain.axes).sum(axis=1, keepdims=True) * chain.axes
-    points = np.where(chain.revolute[:, None], feet, state.mounts[0, :3, 3])
     return replace(
         start,
-        chain=replace(chain, points=points),
+        chain=state.chain,
         mounts=state.mounts,
         lenses=refined.lenses(),
         covariance=_document_covariance(session, refined),

@@ -14,6 +14,7 @@ from calib.chain import Chain
 from calib.closed_form import PoseViews, mean_mount
 from calib.errors import UnsolvableError
 from calib.first_solution import CameraViews
+from calib.held_chain import held_chain
 from calib.likelihood.state import joint_basis
 from calib.observations import Observation
 from calib.session import DhRow, Nominal, Session
@@ -51,7 +52,7 @@ def nominal_solution(
     found = placed(nominal, kinds, views.poses[own], views.readings[own])
     mounts = np.array([found.mount, *[mean_mount(found.chain, views, c) for c in range(1, len(views.links))]])
     return Solution(
-        found.chain,
+        held_chain(session, found.chain),
         mounts,
         seen.lenses,
         prior=prior_information(nominal, kinds, found),

@@ -4,6 +4,7 @@
 readings, which are in each joint's own reading unit. Unknown keys are kept.
 """
 
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, Self
 
@@ -15,20 +16,25 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainSerializer,
+    PlainValidator,
     PrivateAttr,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
 
 from calib.documents import read_json, validate
 from calib.errors import FormatError
+from calib.parameters import LENS_NAMES, Held, held_value, held_values
 from calib.targets import Target, target_points
+from calib.units import nominal_scale
 
 SESSION_FORMAT = "activecam.session/1"
 
 JointKind = Literal["revolute", "prismatic"]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 def _rigid(rows: list[list[float]]) -> list[list[float]]:
@@ -72,12 +78,43 @@ class Intrinsics(Document):
 
     @model_validator(mode="after")
     def _distortion_fits_model(self) -> Self:
-        wanted = {"opencv": 5, "division": 1}[self.model]
+        wanted = len(LENS_NAMES[self.model]) - 4
         if len(self.distortion) != wanted:
             raise ValueError(
                 f"distortion of the model '{self.model}' has {wanted} numbers, not {len(self.distortion)}"
             )
         return self
+
+    def numbers(self) -> dict[str, float]:
+        """Return the lens's numbers by name."""
+        values = [self.fx, self.fy, self.cx, self.cy, *self.distortion]
+        return dict(zip(LENS_NAMES[self.model], values, strict=True))
+
+
+class IntrinsicsStd(Document):
+    """How well a lens's numbers are known: standard deviations, 0 for what is known exactly."""
+
+    fx: NotNegative = 0.0
+    fy: NotNegative = 0.0
+    cx: NotNegative = 0.0
+    cy: NotNegative = 0.0
+    k1: NotNegative = 0.0
+    k2: NotNegative = 0.0
+    p1: NotNegative = 0.0
+    p2: NotNegative = 0.0
+    k3: NotNegative = 0.0
+
+
+def problem_of_std(known: Intrinsics | None, std: IntrinsicsStd | None) -> str | None:
+    """Return why `std` cannot be how well the lens `known` is known, or None."""
+    if std is None:
+        return None
+    if known is None:
+        return "says how well intrinsics are known, and there are none"
+    lacking = [
+        name for name in IntrinsicsStd.model_fields if name not in known.numbers() and getattr(std, name) > 0
+    ]
+    return f"the model '{known.model}' has no {lacking[0]}" if lacking else None
 
 
 class Joint(Document):
@@ -86,10 +123,20 @@ class Joint(Document):
     name: Annotated[str, Field(min_length=1)]
     kind: JointKind
     reading_unit: str
-    reading_std: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    reading_std: NotNegative | None = None
     """How noisy its readings are (standard deviation, in its reading unit); found out where not given."""
     unit_trusted: bool = False
     """Whether the encoder's own unit is to be believed as a measure to verify against."""
+    scale_std: Positive | None = None
+    """How well that unit says the scale beforehand: a standard deviation, relative to it."""
+
+    @field_validator("scale_std")
+    @classmethod
+    def _unit_has_a_scale(cls, std: float | None, info: ValidationInfo) -> float | None:
+        kind, unit = info.data.get("kind"), info.data.get("reading_unit")
+        if std is not None and kind and unit and nominal_scale(kind, unit) is None:
+            raise ValueError(f"'{unit}' is no measure of a {kind} joint by itself: leave it out")
+        return std
 
 
 class Camera(Document):
@@ -99,7 +146,23 @@ class Camera(Document):
     width: Annotated[int, Field(gt=0)] | None = None
     height: Annotated[int, Field(gt=0)] | None = None
     intrinsics: Intrinsics | None = None
+    intrinsics_std: IntrinsicsStd | None = None
     link: str | None = None
+
+    @field_validator("intrinsics_std")
+    @classmethod
+    def _std_fits_intrinsics(cls, std: IntrinsicsStd | None, info: ValidationInfo) -> IntrinsicsStd | None:
+        problem = problem_of_std(info.data.get("intrinsics"), std)
+        if problem:
+            raise ValueError(problem)
+        return std
+
+    def lens_std(self) -> dict[str, float]:
+        """Return how well each number of its known intrinsics is known; 0 for exactly."""
+        if self.intrinsics is None:
+            return {}
+        known = self.intrinsics_std or IntrinsicsStd()
+        return {name: getattr(known, name) for name in self.intrinsics.numbers()}
 
 
 class Points(Document):
@@ -191,6 +254,8 @@ class Session(Document):
     target: StoredTarget
     views: list[View]
     nominal: Nominal | None = None
+    held: dict[str, Annotated[Held | None, PlainValidator(held_value)]] = Field(default_factory=dict)
+    """Parameters that are not found but held at a value, by name; null for what its unit or lens says."""
     origin: WorldOrigin | None = None
     complete: bool = True
     """False while a run adds views, and ever after it was cut off: then it is solved as far as it goes."""
@@ -211,6 +276,17 @@ class Session(Document):
     def with_views(self, views: list[View]) -> Self:
         """Return this session with other views."""
         changed = self.model_copy(update={"views": views})
+        changed._folder = self._folder
+        return changed
+
+    def holding(self, held: Mapping[str, Held | None]) -> Self:
+        """Return this session with more parameters held; raises FormatError for one that there is not."""
+        try:
+            values = {name: held_value(value) for name, value in held.items()}
+            changed = self.model_copy(update={"held": {**self.held, **values}})
+            held_values(changed)
+        except ValueError as error:
+            raise FormatError(f"held: {error}") from None
         changed._folder = self._folder
         return changed
 
@@ -261,6 +337,17 @@ class Session(Document):
             problem = _problem_of_view(view, joints, cameras, points)
             if problem:
                 raise ValueError(f"views[{index}].{problem}")
+        return self
+
+    @model_validator(mode="after")
+    def _known_beforehand(self) -> Self:
+        for index, joint in enumerate(self.joints):
+            if self.nominal is not None and joint.scale_std is not None:
+                raise ValueError(f"joints[{index}].scale_std: the nominal model's std says it already")
+        try:
+            held_values(self)
+        except ValueError as error:
+            raise ValueError(f"held: {error}") from None
         return self
 
 

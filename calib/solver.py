@@ -1,6 +1,6 @@
 """From a session to a calibration."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from calib.advice import weakness_in_words
 from calib.calibration import Calibration, Quality
@@ -11,6 +11,7 @@ from calib.lens_calibration import lens_in_words
 from calib.most_likely import left_out_in_words, most_likely
 from calib.nominal import nominal_solution
 from calib.observations import Observation, Progress, observe
+from calib.parameters import Held
 from calib.quality import judged
 from calib.session import Session
 from calib.solution import Solution
@@ -19,16 +20,22 @@ from calib.targets import target_points
 from calib.unfinished import finished_part
 
 
-def solve(session: Session, method: Method = "ml", progress: Progress | None = None) -> Calibration:
+def solve(
+    session: Session,
+    method: Method = "ml",
+    progress: Progress | None = None,
+    hold: Mapping[str, Held | None] | None = None,
+) -> Calibration:
     """Calibrate the active camera of `session`: chain, camera on it, base and lens, with no initial guess.
 
     `ml` is the maximum-likelihood fit with its uncertainty, `closed_form` the paper's method, from which it starts.
     `progress` is told what is being done. Views marked `verify` are held out; they only enter the quality. A
     session that was cut off (`complete` is false) is solved as far as it goes, for the joints that were
-    exercised. Raises UnsolvableError, which names the joint or view and what would help, and ImageError for
-    a missing picture.
+    exercised. `hold` are parameters to be kept at a value, by name, beside those that the session holds
+    (`calib.parameters`). Raises FormatError for one that there is not, UnsolvableError, which names the joint or
+    view and what would help, and ImageError for a missing picture.
     """
-    session, cut_off = finished_part(session)
+    session, cut_off = finished_part(session.holding(hold or {}))
     observed = observe(session, progress)
     if progress is not None:
         progress("solving")

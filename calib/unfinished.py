@@ -1,11 +1,14 @@
 """What can be solved of a session that was cut off: the joints whose sweeps were begun well enough."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.closed_form import PoseViews
 from calib.errors import UnsolvableError
-from calib.session import Camera, Session, View, WorldOrigin
+from calib.parameters import Held
+from calib.session import Camera, Joint, Session, View, WorldOrigin
 from calib.sweeps import sweep_labels
 
 Mask = NDArray[np.bool_]
@@ -53,6 +56,7 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
                 for view, keep in zip(session.views, kept, strict=True)
                 if keep
             ],
+            "held": _held_of_the_rest(session, left_out),
             "origin": session.origin and _reduced_origin(session.origin, done),
         }
     )
@@ -64,6 +68,12 @@ def _with_readings(view: View, done: Mask, names: list[str]) -> View:
     joint = view.joint if view.joint in names else None
     sides = view.approached and [side for side, keep in zip(view.approached, done, strict=True) if keep]
     return view.model_copy(update={"readings": readings, "joint": joint, "approached": sides})
+
+
+def _held_of_the_rest(session: Session, left_out: Sequence[Joint]) -> dict[str, Held | None]:
+    """Return what is held of all but the joints `left_out`."""
+    gone = {f"{joint.name}.{entry}" for joint in left_out for entry in ("scale", "axis", "point")}
+    return {name: value for name, value in session.held.items() if name not in gone}
 
 
 def _reduced_origin(origin: WorldOrigin, done: Mask) -> WorldOrigin:

@@ -24,6 +24,7 @@ class AxisDocument(BaseModel):
     tolerance: float
     reading_std: float | None
     unit_trusted: bool
+    scale_std: float | None
     controller: str
     driver: str
 
@@ -39,6 +40,7 @@ class CameraDocument(BaseModel):
     height: int
     link: str | None
     intrinsics: dict[str, Any] | None
+    intrinsics_std: dict[str, Any] | None
 
 
 class SweepDocument(BaseModel):
@@ -112,6 +114,7 @@ def _axes(profile: Profile) -> list[AxisDocument]:
             tolerance=axis.spec.tolerance,
             reading_std=axis.reading_std,
             unit_trusted=axis.unit_trusted,
+            scale_std=axis.scale_std,
             controller=axis.controller,
             driver=profile.controllers[axis.controller].driver,
         )
@@ -128,6 +131,9 @@ def _camera(profile: Profile) -> CameraDocument:
         height=camera.spec.height,
         link=camera.link,
         intrinsics=None if camera.intrinsics is None else camera.intrinsics.model_dump(mode="json"),
+        intrinsics_std=None
+        if camera.intrinsics_std is None
+        else camera.intrinsics_std.model_dump(mode="json"),
     )
 
 

@@ -6,6 +6,7 @@
     chain_terms          each view's pose and its derivatives by every parameter and reading
     blocks               what each view says of its pose, lens and target
     problem              the likelihood: measurements, what is free, what is known beforehand
+    beforehand           what is held, and what is known about
     building             a session as that likelihood
     normal               every view's information, mapped to the parameters
     descent              Levenberg and Marquardt's way down

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from calib.chain import Chain
 from calib.closed_form import PoseViews
+from calib.lens_prior import lens_prior
+from calib.likelihood.beforehand import beforehand
 from calib.likelihood.lens_terms import lens_vector
 from calib.likelihood.measurements import GivenPoses, point_views
 from calib.likelihood.problem import Estimate, Group, Problem, offsets_at
@@ -35,14 +37,20 @@ class Start:
 
 def built(session: Session, observations: Sequence[Observation], start: Start) -> tuple[Problem, Estimate]:
     """Return the likelihood of the session's fit views, and the estimate at `start`."""
-    lenses = tuple(None if lens is None else lens_vector(lens) for lens in start.lenses)
+    priors = [
+        None if lens is None else lens_prior(session, camera, lens.model)
+        for camera, lens in enumerate(start.lenses)
+    ]
+    lenses = tuple(
+        None if lens is None or prior is None else prior.imposed(lens_vector(lens))
+        for lens, prior in zip(start.lenses, priors, strict=True)
+    )
     state = State(start.chain, start.mounts, lenses, np.zeros(0), np.zeros(0))
     models = [None if lens is None else lens.model for lens in start.lenses]
     joints, cameras = [joint.name for joint in session.joints], [camera.name for camera in session.cameras]
-    layout = Layout.of(state, joints, cameras, models)
-    free = np.ones(len(layout), dtype=bool)
-    for camera, part in zip(session.cameras, layout.lenses, strict=True):
-        free[part] = camera.intrinsics is None
+    changes = [None if prior is None else prior.by_step() for prior in priors]
+    layout = Layout.of(state, joints, cameras, models, lens_changes=changes)
+    known = beforehand(session, layout, state, priors, start.prior)
     points = target_points(session.target)
     groups: list[Group] = []
     for index in range(len(cameras)):
@@ -64,21 +72,13 @@ def built(session: Session, observations: Sequence[Observation], start: Start) -
         regressors=np.zeros((*readings.shape, 0)),
         noisiness=noisiness,
         reading_std=np.array([joint.reading_std or 0.0 for joint in session.joints]),
-        free=free,
-        prior=_padded(start.prior, len(layout)),
+        free=known.free,
+        prior=known.information,
         disk_diameter=disk_diameter(session.target),
         bulges=np.zeros((len(points), 0)),
     )
-    estimate = Estimate(state, np.zeros_like(readings), np.zeros(len(layout)), offsets=())
+    estimate = Estimate(state, np.zeros_like(readings), known.travel, offsets=())
     return problem, replace(estimate, offsets=offsets_at(problem, estimate))
-
-
-def _padded(prior: Array | None, count: int) -> Array:
-    """Return the prior (p, p), nothing being known of the parameters that it does not reach."""
-    information = np.zeros((count, count))
-    if prior is not None:
-        information[: len(prior), : len(prior)] = prior
-    return information
 
 
 def _readings_and_noisiness(session: Session) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.errors import UnsolvableError
 from calib.likelihood.measurements import PointViews
 from calib.likelihood.normal import NormalEquations, normal_equations
 from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, evaluate, offsets_at
@@ -20,6 +21,8 @@ NOTHING = 1e-6
 MOST_DAMPING = 1e12
 HELD_PX = 1e-4
 """By how much what centroids of disks are off by may be out of date."""
+UNTOLD = 1e-24
+"""Part of the largest information of a parameter that is no more than rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +38,14 @@ class Descent:
 def descend(problem: Problem, start: Estimate, weights: Weights) -> Descent:
     """Return the most likely estimate that is found going down from `start`.
 
-    What centroids of disks are off by is held while going down, and taken anew until it no longer matters.
+    What centroids of disks are off by is held while going down, and taken anew until it no longer matters. Raises
+    UnsolvableError where no measurement counts.
     """
+    if count_measurements(problem, weights) == 0:
+        raise UnsolvableError(
+            "no view agrees with the others and with what is held or known beforehand: "
+            "are the readings, the target, and the values that are held right?"
+        )
     descent = _round(problem, start, weights)
     for _ in range(MOST_ROUNDS):
         held, renewed = descent.estimate.offsets, offsets_at(problem, descent.estimate)
@@ -84,7 +93,10 @@ def solve_damped(equations: NormalEquations, free: NDArray[np.bool_], damping: f
     """Return the step (p,) downwards, zero where nothing is free; units are taken out by the information's diagonal."""
     step = np.zeros(len(free))
     information = equations.information[np.ix_(free, free)]
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    sizes = np.diag(information)
+    # What nothing is measured of, all its views being set aside, has but rounding to go by: it stays.
+    told = sizes > UNTOLD * sizes.max(initial=0.0)
+    scale = np.where(told, 1 / np.sqrt(np.where(told, sizes, 1.0)), 0.0)
     scaled = information * np.outer(scale, scale) + damping * np.eye(len(scale))
     step[free] = -scale * np.linalg.lstsq(scaled, scale * equations.gradient[free], rcond=1e-14)[0]
     return step

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.likelihood.lens_terms import LENS_NAMES
 from calib.likelihood.state import Layout, State, joint_basis
+from calib.parameters import LENS_NAMES
 from calib.twists import skew
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def document_jacobian(
         model = models[camera]
         if model is not None:
             by_lens = np.zeros((len(LENS_NAMES[model]), count))
-            by_lens[:, layout.lenses[camera]] = np.eye(len(by_lens))
+            by_lens[:, layout.lenses[camera]] = layout.lens_changes[camera]
             first, bends = ["fx", "fy", "cx", "cy"], range(len(by_lens) - 4)
             paths = first + [f"distortion.{i}" for i in bends]
             add([f"cameras.{camera}.intrinsics.{path}" for path in paths], by_lens)

@@ -7,15 +7,10 @@ from calib.session import Intrinsics
 
 Array = NDArray[np.float64]
 
-LENS_NAMES = {
-    "opencv": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"),
-    "division": ("fx", "fy", "cx", "cy", "k1"),
-}
-
 
 def lens_vector(lens: Intrinsics) -> Array:
     """Return the lens's parameters in the order of `LENS_NAMES`."""
-    return np.array([lens.fx, lens.fy, lens.cx, lens.cy, *lens.distortion], dtype=float)
+    return np.array([*lens.numbers().values()], dtype=float)
 
 
 def lens_from_vector(values: Array, like: Intrinsics) -> Intrinsics:

@@ -54,11 +54,11 @@ def local_by_parameter(problem: Problem, group: Group, terms: GroupTerms) -> Arr
     if not isinstance(group.data, PointViews):
         return by_pose
     lens, warp = layout.lenses[group.camera], layout.warp
-    numbers = lens.stop - lens.start + warp.stop - warp.start
-    local = np.zeros((len(by_pose), 6 + numbers, len(layout)))
+    bent = 6 + lens.stop - lens.start
+    local = np.zeros((len(by_pose), bent + warp.stop - warp.start, len(layout)))
     local[:, :6] = by_pose
-    for row, column in enumerate([*range(lens.start, lens.stop), *range(warp.start, warp.stop)]):
-        local[:, 6 + row, column] = 1
+    local[:, 6:bent, lens] = layout.lens_changes[group.camera]
+    local[:, bent:, warp] = np.eye(warp.stop - warp.start)
     return local
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import Chain
-from calib.likelihood.lens_terms import LENS_NAMES
+from calib.parameters import LENS_NAMES
 from calib.transforms import any_normal
 from calib.twists import exp_twist, skew
 
@@ -48,8 +48,8 @@ class State:
             ),
             mounts=self.mounts @ motions[joints:],
             lenses=tuple(
-                None if lens is None else lens + step[part]
-                for lens, part in zip(self.lenses, layout.lenses, strict=True)
+                None if lens is None else lens + change @ step[part]
+                for lens, part, change in zip(self.lenses, layout.lenses, layout.lens_changes, strict=True)
             ),
             corrections=self.corrections + step[layout.corrections],
             warp=self.warp + step[layout.warp],
@@ -58,13 +58,17 @@ class State:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each part of the state lies in the vector of steps, and what each entry is called."""
+    """Where each part of the state lies in the vector of steps, and what each entry is called.
+
+    `lens_changes` (l, l) are how each lens's numbers change with their steps: a number may follow another.
+    """
 
     names: tuple[str, ...]
     shapes: tuple[slice, ...]
     scales: tuple[int, ...]
     mounts: tuple[slice, ...]
     lenses: tuple[slice, ...]
+    lens_changes: tuple[Array, ...]
     corrections: slice
     warp: slice
 
@@ -80,8 +84,9 @@ class Layout:
         models: Sequence[str | None],
         corrections: Sequence[str] = (),
         warp: Sequence[str] = (),
+        lens_changes: Sequence[Array | None] | None = None,
     ) -> "Layout":
-        """Return the layout of `state`, whose parts are called as given."""
+        """Return the layout of `state`, whose parts are called as given; lens numbers change as they step."""
         names: list[str] = []
 
         def take(owner: str, *entries: str) -> slice:
@@ -98,11 +103,16 @@ class Layout:
             take(camera, *(() if model is None else LENS_NAMES[model]))
             for camera, model in zip(cameras, models, strict=True)
         ]
+        changes = [None] * len(lenses) if lens_changes is None else lens_changes
         return cls(
             shapes=tuple(shapes),
             scales=tuple(scales),
             mounts=tuple(mounts),
             lenses=tuple(lenses),
+            lens_changes=tuple(
+                np.eye(part.stop - part.start) if change is None else change
+                for part, change in zip(lenses, changes, strict=True)
+            ),
             corrections=take("correction", *corrections),
             warp=take("warp", *warp),
             names=tuple(names),

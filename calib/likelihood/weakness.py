@@ -70,12 +70,12 @@ def weaknesses(
     """Return what the fit leaves in the dark, the worst first; `variance` is that of a whitened measurement."""
     groups = _hiding_each_other(
         _asked(session, problem, descent),
-        covariance_of(descent.equations.information, problem.free, variance),
+        covariance_of(problem, descent.equations.information, variance),
     )
     if not groups:
         return []
     usual = usual_rig(problem, descent, weights)
-    present = covariance_of(usual.equations.information, problem.free, variance)
+    present = covariance_of(problem, usual.equations.information, variance)
     offered = _offered(session, problem, usual, variance)
     there = {(one.kind, one.owner): one for one in _asked(session, problem, usual)}
     found = []
@@ -127,7 +127,7 @@ def _offered(
         told = information_of(others, session, problem, descent.estimate)
         if told is not None:
             kept = descent.equations.information if others.plate is None else problem.prior
-            offered.append((others.change, covariance_of(kept + told, problem.free, variance)))
+            offered.append((others.change, covariance_of(problem, kept + told, variance)))
     return offered
 
 

@@ -10,6 +10,8 @@ import typer
 from rich.table import Table
 
 from calib import Calibration, load_session, save_calibration
+from calib.errors import FormatError
+from calib.parameters import Held
 from calib.session_writer import keep_origin
 from daemon.cli.console import output, progress_line, warn
 
@@ -35,14 +37,25 @@ def solve(
         Method,
         typer.Option(help="The most likely calibration with its uncertainty, or the paper's closed form."),
     ] = Method.ml,
+    hold: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[=VALUE]",
+            help="A parameter that is kept instead of found, such as pan.scale or main.k3=0. May be repeated.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON.")] = False,
 ) -> None:
     """Calibrate from a session's views: chain, camera on it, base and lens, with no initial guess."""
     from calib import solve as solve_session
 
     loaded = load_session(session)
+    try:
+        holding = loaded.holding(dict(map(_held, hold or [])))
+    except FormatError as error:
+        raise typer.BadParameter(str(error)) from None
     with progress_line() as progress:
-        calibration = solve_session(loaded, method.value, progress)
+        calibration = solve_session(holding, method.value, progress)
     save_calibration(calibration, result)
     # A session that cannot be written to is solved all the same.
     with suppress(OSError):
@@ -54,6 +67,18 @@ def solve(
         return
     print_calibration(calibration)
     output.print(f"Calibration written to {result}", soft_wrap=True)
+
+
+def _held(text: str) -> tuple[str, Held | None]:
+    """Return the parameter of `pan.scale`, `main.k3=0` or `pan.axis=0,0,1`, and what it is held at, if that is said."""
+    name, said, value = text.partition("=")
+    try:
+        numbers = [float(number) for number in value.split(",")] if said else []
+    except ValueError:
+        raise typer.BadParameter(
+            f"--hold {text}: '{value}' is not a number, nor three with commas between them"
+        ) from None
+    return name, numbers if len(numbers) > 1 else next(iter(numbers), None)
 
 
 def print_calibration(calibration: Calibration) -> None:

@@ -21,6 +21,8 @@ class AxisProfile:
     """Standard deviation of a reading, in the reading unit."""
     unit_trusted: bool
     """Whether the encoder's unit is believed as a measure to verify against."""
+    scale_std: float | None
+    """How well that unit says the scale beforehand, relative to it."""
     controller: str
     options: BaseModel
     """An instance of the driver's `AxisOptions`."""
@@ -42,7 +44,7 @@ def resolve_axes(table: ProfileTable, problems: Problems) -> list[AxisProfile]:
                 problems.add((*path, "reading_std"), f"must not be negative, as {axis.reading_std} is")
         options = resolve_axis_options(index, axis, table.controllers, problems)
         if options is not None:
-            axes.append(AxisProfile(spec, std, axis.unit_trusted, axis.controller, options))
+            axes.append(AxisProfile(spec, std, axis.unit_trusted, axis.scale_std, axis.controller, options))
     return axes
 
 
@@ -65,9 +67,13 @@ def _spec(axis: AxisTable, path: KeyPath, problems: Problems) -> AxisSpec:
 
 def _check_trust(axis: AxisTable, path: KeyPath, problems: Problems) -> None:
     measure = ANGLE if axis.kind == "revolute" else LENGTH
-    if axis.unit_trusted and axis.reading_unit not in measure.units:
-        problems.add(
-            (*path, "unit_trusted"),
-            f"{axis.reading_unit} do not measure a {axis.kind} axis by themselves: "
-            f"only {', '.join(measure.units)} can be trusted; set it to false",
-        )
+    for key, trusted, instead in (
+        ("unit_trusted", axis.unit_trusted, "set it to false"),
+        ("scale_std", axis.scale_std is not None, "leave it out"),
+    ):
+        if trusted and axis.reading_unit not in measure.units:
+            problems.add(
+                (*path, key),
+                f"{axis.reading_unit} do not measure a {axis.kind} axis by themselves: "
+                f"only {', '.join(measure.units)} can be trusted; {instead}",
+            )

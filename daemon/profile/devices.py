@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from calib.session import Intrinsics
+from calib.session import Intrinsics, IntrinsicsStd, problem_of_std
 from daemon.profile.problems import Problems
 from daemon.profile.tables import AxisTable, CameraTable, ControllerTable
 from drivers import registry
@@ -35,6 +35,8 @@ class CameraProfile:
     """The axis that it rides on; None for the last one."""
     intrinsics: Intrinsics | None
     """Its lens, where it is known beforehand."""
+    intrinsics_std: IntrinsicsStd | None
+    """How well; exactly where that is not said."""
 
 
 def resolve_controllers(
@@ -95,10 +97,15 @@ def resolve_camera(table: CameraTable, axes: list[AxisTable], problems: Problems
     intrinsics = table.intrinsics and Intrinsics.model_validate(
         table.intrinsics.model_dump(exclude_unset=True)
     )
-    return CameraProfile(spec, table.driver, options, table.link, intrinsics)
+    std = table.intrinsics_std and IntrinsicsStd.model_validate(
+        table.intrinsics_std.model_dump(exclude_unset=True)
+    )
+    return CameraProfile(spec, table.driver, options, table.link, intrinsics, std)
 
 
 def _check_intrinsics(table: CameraTable, problems: Problems) -> None:
+    if problem := problem_of_std(table.intrinsics, table.intrinsics_std):
+        problems.add(("camera", "intrinsics_std"), problem)
     known: dict[str, Any] = table.intrinsics.model_dump(exclude_none=True) if table.intrinsics else {}
     for key in ("width", "height"):
         size = getattr(table, key)

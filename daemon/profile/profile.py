@@ -59,7 +59,8 @@ def _joint(axis: AxisProfile) -> dict[str, Any]:
         "reading_unit": axis.spec.unit,
         "unit_trusted": axis.unit_trusted,
     }
-    return joint if axis.reading_std is None else joint | {"reading_std": axis.reading_std}
+    known = {"scale_std": axis.scale_std, "reading_std": axis.reading_std}
+    return joint | {key: value for key, value in known.items() if value is not None}
 
 
 def _camera(camera: CameraProfile) -> dict[str, Any]:
@@ -72,4 +73,6 @@ def _camera(camera: CameraProfile) -> dict[str, Any]:
         known["link"] = camera.link
     if camera.intrinsics is not None:
         known["intrinsics"] = camera.intrinsics.model_dump(exclude_unset=True)
+    if camera.intrinsics_std is not None:
+        known["intrinsics_std"] = camera.intrinsics_std.model_dump(exclude_unset=True)
     return known

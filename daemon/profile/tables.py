@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
-from calib.session import Intrinsics
+from calib.session import Intrinsics, IntrinsicsStd
 from daemon.profile.targets import TargetTable
 from drivers.axis import JointKind
 from drivers.quantities import NUMBER, Duration, PositiveDuration, written
@@ -58,6 +58,9 @@ class AxisTable(Table):
     kind: JointKind
     reading_unit: Annotated[Unit, Field(examples=["mm", "deg", "counts"])]
     unit_trusted: bool = Field(False, description="Whether the encoder's unit is believed as a measure.")
+    scale_std: Annotated[
+        float | None, Field(gt=0, description="How well the unit says the scale, relative to it.")
+    ] = None
     limits: Annotated[tuple[Reading, Reading], Field(strict=False)]
     velocity: Velocity
     acceleration: Acceleration
@@ -81,6 +84,12 @@ class IntrinsicsTable(Intrinsics):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
+class IntrinsicsStdTable(IntrinsicsStd):
+    """How well a known lens is known: standard deviations; what is not named is known exactly."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
 class CameraTable(Table):
     """The camera."""
 
@@ -93,6 +102,7 @@ class CameraTable(Table):
     )
     options: Options = Field({}, description="The driver's own keys.")
     intrinsics: IntrinsicsTable | None = None
+    intrinsics_std: IntrinsicsStdTable | None = None
 
 
 class SweepTable(Table):

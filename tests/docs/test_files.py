@@ -27,6 +27,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "### `[controllers.NAME]`": tables.ControllerTable,
     "### `[camera]`": tables.CameraTable,
     "### `[camera.intrinsics]`": tables.IntrinsicsTable,
+    "### `[camera.intrinsics_std]`": tables.IntrinsicsStdTable,
     "### `[procedure]`": tables.ProcedureTable,
     "### `[[procedure.sweeps]]`": tables.SweepTable,
     "### `[[procedure.views]]`": tables.ViewTable,

@@ -37,6 +37,23 @@ def test_a_unit_that_does_not_measure_its_axis_cannot_be_trusted(problems: Probl
     ]
 
 
+def test_a_unit_that_does_not_measure_its_axis_says_no_scale(problems: Problems) -> None:
+    found = problems(
+        ('kind = "prismatic"', 'kind = "revolute"'), ("unit_trusted = true", "scale_std = 0.001")
+    )
+    assert found == [
+        "8: axes[0].scale_std (slide): mm do not measure a revolute axis by themselves: "
+        "only rad, mrad, deg can be trusted; leave it out"
+    ]
+
+
+def test_how_well_a_lens_is_known_wants_a_lens(problems: Problems) -> None:
+    found = problems(("[target]", "[camera.intrinsics_std]\nfx = 3\n\n[target]"))
+    assert [problem.partition(": ")[2] for problem in found] == [
+        "camera.intrinsics_std: says how well intrinsics are known, and there are none"
+    ]
+
+
 def test_an_axis_whose_zero_is_out_of_reach_must_be_told_where_to_stand(problems: Problems) -> None:
     found = problems(('limits = ["0 mm", "1 m"]', 'limits = ["1 mm", "1 m"]'), ('{ slide = "500 mm" }', "{}"))
     assert found == [

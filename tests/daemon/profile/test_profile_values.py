@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from calib import targets
+from calib.parameters import LENS_NAMES
 from calib.session import load_session
 from daemon.profile import PlannedView, Profile
 from drivers.axis import AxisSpec
@@ -157,6 +158,13 @@ def test_an_empty_session_describes_the_rig_and_not_the_simulation(load: Load) -
         "target": {"kind": "circle_grid", "rows": 6, "columns": 7, "pitch": 0.03, "disk_diameter": 0.018},
         "views": [],
     }
+
+
+def test_what_is_about_known_goes_into_the_session(load: Load) -> None:
+    about = LENS.replace("[target]", "[camera.intrinsics_std]\nfx = 3\nfy = 3\n\n[target]")
+    session = load(("\n[target]", about), ("unit_trusted = true", "scale_std = 1e-4")).empty_session()
+    assert [joint.scale_std for joint in session.joints] == [1e-4, None]
+    assert session.cameras[0].lens_std() == dict.fromkeys(LENS_NAMES["opencv"], 0.0) | {"fx": 3.0, "fy": 3.0}
 
 
 @pytest.mark.parametrize(

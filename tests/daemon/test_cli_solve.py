@@ -1,0 +1,59 @@
+"""`activecam solve` holds what it is told to, and says what it cannot."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from daemon.cli.main import main
+from tests.calib.scenes import DISK_CENTRES, DISKS, plan, points_session, two_axis_rig
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    target = {key: value for key, value in DISKS.items() if key != "disk_diameter"} | {"kind": "chessboard"}
+    measured = points_session(two_axis_rig(), plan(), target, DISK_CENTRES)
+    file = tmp_path / "session.json"
+    file.write_text(measured.model_dump_json(exclude_unset=True))
+    return file
+
+
+def test_what_is_held_is_in_the_result_and_not_in_the_session(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = session.read_text()
+    axis = two_axis_rig().axes[1]
+    hold = ["pan.scale", "slide.scale=0.001", "main.aspect", f"pan.axis={','.join(map(str, 2 * axis))}"]
+    options = [word for name in hold for word in ("--hold", name)]
+    with pytest.raises(SystemExit) as ended:
+        main(["solve", str(session), "-o", str(session.with_name("c.json")), "--json", *options])
+    assert ended.value.code == 0
+    found = json.loads(capsys.readouterr().out)
+    slide, pan = found["joints"]
+    assert (slide["scale"], slide["scale_std"]) == (0.001, 0.0)
+    assert pan["scale"] == pytest.approx(0.017453292519943295, rel=1e-15)
+    assert pan["axis"] == pytest.approx(axis.tolist(), abs=1e-15)
+    assert found["cameras"][0]["intrinsics"]["fx"] == found["cameras"][0]["intrinsics"]["fy"]
+    assert session.read_text() == before
+
+
+@pytest.mark.parametrize(
+    ("hold", "says"),
+    [
+        (
+            "pam.scale",
+            "there is no parameter 'pam.scale' to hold; there are slide.scale, slide.axis, pan.scale",
+        ),
+        ("pan.scale=x", "--hold pan.scale=x: 'x' is not a number, nor three with commas between them"),
+        ("pan.scale=", "--hold pan.scale=: '' is not a number"),
+        ("pan.axis=1,2", "must be a number, three numbers, or null"),
+        ("pan.scale=nan", "must be a number, three numbers, or null"),
+    ],
+)
+def test_what_cannot_be_held_is_a_wrong_call(
+    session: Path, capsys: pytest.CaptureFixture[str], hold: str, says: str
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["solve", str(session), "--hold", hold])
+    assert ended.value.code == 2
+    assert says in capsys.readouterr().err
