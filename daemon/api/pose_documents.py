@@ -1,7 +1,7 @@
 """The answers about the camera's pose, as OpenAPI describes them; they are written without these models."""
 
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
@@ -14,6 +14,9 @@ class PoseAtReadings(BaseModel):
     """The camera's pose at given readings."""
 
     readings: list[float] = Field(description="Raw joint readings in chain order, each in its own unit.")
+    approached: list[Literal[-1, 0, 1]] = Field(
+        description="From which side each joint came to it: 1 from below, -1 from above, 0 where not known."
+    )
     world_from_camera: Matrix = Field(
         description="The camera's pose: p_world = world_from_camera @ p_camera; row-major, metres."
     )

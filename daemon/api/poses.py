@@ -1,7 +1,7 @@
 """Routes of the camera's pose, and of what it sees where."""
 
 import asyncio
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, Request, Response
@@ -35,6 +35,15 @@ FewReadings = Annotated[
     list[list[Number]],
     Field(min_length=1, max_length=100, description="As for poses; the latest readings where left out."),
 ]
+Sides = Annotated[
+    list[list[Literal[-1, 0, 1]]] | None,
+    Field(
+        max_length=10_000,
+        description="From which side each joint came to each of the readings: 1 from below, -1 from above, 0 where not "
+        "known. Of a joint with backlash whose side is not known, the middle of its play is taken.",
+        examples=[[[1, -1]]],
+    ),
+]
 CameraName = Annotated[str | None, Field(description="The camera; the first where left out.")]
 
 SMALL = 64
@@ -45,6 +54,7 @@ class PosesRequest(RequestBody):
     """Where the camera would be."""
 
     readings: Readings
+    approached: Sides = None
     camera: CameraName = None
 
 
@@ -105,9 +115,10 @@ async def get_pose(request: Request) -> Response:
 async def get_poses(request: PosesRequest, service: ServiceDep) -> Response:
     """Answer with one pose for each vector of readings; moves nothing."""
     readings = _vectors(service, request.readings)
+    sides = None if request.approached is None else _sides(request.approached, readings)
     if len(readings) <= SMALL:
-        return _json(service.poses.at(readings, request.camera))
-    return _json(await asyncio.to_thread(service.poses.at, readings, request.camera))
+        return _json(service.poses.at(readings, request.camera, sides))
+    return _json(await asyncio.to_thread(service.poses.at, readings, request.camera, sides))
 
 
 PIXEL_PROBLEMS = answers(
@@ -125,8 +136,8 @@ PIXEL_PROBLEMS = answers(
 async def project_points(request: ProjectRequest, service: ServiceDep) -> Response:
     """Answer with the pixel at which each point is seen, for each vector of readings."""
     active = service.poses.active
-    points, readings = np.array(request.points, dtype=float), _readings(service, request.readings)
-    pixels = await asyncio.to_thread(project, active, points, readings, request.camera)
+    points, (readings, sides) = np.array(request.points, dtype=float), _readings(service, request.readings)
+    pixels = await asyncio.to_thread(project, active, points, readings, request.camera, sides)
     return _json(
         to_json(
             {
@@ -143,8 +154,8 @@ async def project_points(request: ProjectRequest, service: ServiceDep) -> Respon
 async def pixel_rays(request: RaysRequest, service: ServiceDep) -> Response:
     """Answer with the ray along which each pixel looks, for each vector of readings."""
     active = service.poses.active
-    pixels, readings = np.array(request.pixels, dtype=float), _readings(service, request.readings)
-    found = await asyncio.to_thread(rays, active, pixels, readings, request.camera)
+    pixels, (readings, sides) = np.array(request.pixels, dtype=float), _readings(service, request.readings)
+    found = await asyncio.to_thread(rays, active, pixels, readings, request.camera, sides)
     bundles = [
         {"origin": origin.tolist(), "directions": _rows(directions)}
         for origin, directions in zip(found.origins, found.directions, strict=True)
@@ -161,8 +172,14 @@ async def pixel_rays(request: RaysRequest, service: ServiceDep) -> Response:
     )
 
 
-def _readings(service: Service, given: list[list[float]] | None) -> NDArray[np.float64]:
-    return service.poses.readings_now()[None] if given is None else _vectors(service, given)
+def _readings(
+    service: Service, given: list[list[float]] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Return readings (n, m), the latest where none are given, and their sides (n, m), of the latest alone known."""
+    if given is not None:
+        return _vectors(service, given), None
+    readings, sides = service.poses.readings_now()
+    return readings[None], sides[None]
 
 
 def _vectors(service: Service, given: list[list[float]]) -> NDArray[np.float64]:
@@ -174,6 +191,13 @@ def _vectors(service: Service, given: list[list[float]]) -> NDArray[np.float64]:
                 f"readings[{index}] has {len(vector)} numbers: give one for each axis, {', '.join(axes)}"
             )
     return np.array(given, dtype=float)
+
+
+def _sides(given: list[list[Literal[-1, 0, 1]]], readings: NDArray[np.float64]) -> NDArray[np.int_]:
+    """Return the sides (n, m) of `readings` (n, m); raises ReadingsError unless there is one for each of them."""
+    if [len(sides) for sides in given] != [readings.shape[1]] * len(readings):
+        raise ReadingsError("approached must have as many lists, of as many numbers, as readings")
+    return np.array(given)
 
 
 def _rows(values: ArrayLike) -> list[Any]:

@@ -51,7 +51,7 @@ app.add_typer(profile.app, name="profile")
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with 0, 1 (could not), 2 (wrong call) or 130 (interrupted)."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    sys.exit(_run(spread_readings(given or ["--help"])))
+    sys.exit(_run(spread_numbers(given or ["--help"])))
 
 
 def _run(arguments: list[str]) -> int:
@@ -108,20 +108,20 @@ FAILURES: tuple[tuple[type[Exception], int, Callable[[Exception], str]], ...] = 
 """What each kind of error ends a command with; the first that fits."""
 
 
-def spread_readings(arguments: list[str]) -> list[str]:
-    """Return the arguments with `--readings 12.5 -30` as `--readings=12.5 --readings=-30`.
+def spread_numbers(arguments: list[str]) -> list[str]:
+    """Return the arguments with `--readings 12.5 -30` as `--readings=12.5 --readings=-30`; so too `--approached`.
 
     Click has no options with any number of values, and would take a negative reading for an option.
     """
     spread: list[str] = []
-    values = False
+    option = None
     for argument in arguments:
-        if argument == "--readings":
-            values = True
-        elif values and _is_number(argument):
-            spread.append(f"--readings={argument}")
+        if argument in ("--readings", "--approached"):
+            option = argument
+        elif option is not None and _is_number(argument):
+            spread.append(f"{option}={argument}")
         else:
-            values = False
+            option = None
             spread.append(argument)
     return spread
 

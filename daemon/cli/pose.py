@@ -17,6 +17,15 @@ from daemon.cli.console import warn
 Readings = Annotated[
     list[float] | None, typer.Option("--readings", help="One number a joint, in its reading unit.")
 ]
+Approached = Annotated[
+    list[int] | None,
+    typer.Option(
+        "--approached",
+        min=-1,
+        max=1,
+        help="From which side each joint came: 1 from below, -1 from above, 0 if unknown.",
+    ),
+]
 ReadingsFile = Annotated[Path | None, typer.Option("--readings-file", help="A JSON list of such lists.")]
 
 
@@ -29,6 +38,7 @@ def pose(
     calibration: Annotated[Path, typer.Argument(help="A calibration file.")],
     readings: Readings = None,
     readings_file: ReadingsFile = None,
+    approached: Approached = None,
     camera: Annotated[str | None, typer.Option(help="Which camera, the first by default.")] = None,
 ) -> None:
     """Print the camera's pose at given readings as JSON: metres, row-major 4 x 4 matrices."""
@@ -37,8 +47,9 @@ def pose(
     for names in {tuple(loaded.out_of_range(one)) for one in wanted}:
         if names:
             warn(f"beyond the readings seen in calibration: {', '.join(names)}")
-    poses = loaded.world_from_camera(wanted, camera)
-    print_poses(wanted, poses, loaded.base_from_world(), loaded.pose_covariance(wanted, camera))
+    poses = loaded.world_from_camera(wanted, camera, approached)
+    covariances = loaded.pose_covariance(wanted, camera, approached)
+    print_poses(wanted, poses, loaded.base_from_world(), covariances)
 
 
 def wanted_readings(readings: list[float] | None, file: Path | None, joints: list[str]) -> list[list[float]]:

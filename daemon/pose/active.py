@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from calib import Calibration
 from calib.errors import ReadingsError
@@ -19,10 +19,13 @@ Array = NDArray[np.float64]
 class Poses:
     """Poses at n readings: transforms (n, 4, 4), quaternions (n, 4; x, y, z, w), joints beyond the range.
 
+    `approached` (n, m) are the sides from which the joints came: 1 from below, -1 from above, 0 where not known.
+
     `covariance` (n, 6, 6) is of rotation (rad), then position (m), in the camera's frame; None where it is not known.
     """
 
     readings: Array
+    approached: Array
     world_from_camera: Array
     base_from_camera: Array
     quaternion: Array
@@ -68,22 +71,24 @@ class ActiveCalibration:
             raise LensUnknownError(f"the active calibration does not know the lens of camera '{known}'")
         return lens
 
-    def poses(self, readings: Array, camera: str | None) -> Poses:
-        """Return the camera's poses at `readings` (n, m).
+    def poses(self, readings: Array, camera: str | None, approached: ArrayLike | None = None) -> Poses:
+        """Return the camera's poses at `readings` (n, m), each `approached` from a side (n, m), none known by default.
 
-        Raises UnknownCameraError, and ReadingsError for readings of the wrong number or too large.
+        Raises UnknownCameraError, and ReadingsError for readings or sides of the wrong number, or readings too large.
         """
         name = self.camera(camera)
+        sides = np.zeros(readings.shape, dtype=int) if approached is None else np.asarray(approached)
         with np.errstate(all="ignore"):
-            world_from_camera = self.calibration.world_from_camera(readings, name)
+            world_from_camera = self.calibration.world_from_camera(readings, name, sides)
         if not np.all(np.isfinite(world_from_camera)):
             raise ReadingsError("readings are too large to compute a pose with: give readings of this rig")
         return Poses(
             readings,
+            sides,
             world_from_camera,
             self.base_from_world @ world_from_camera,
             quaternions(world_from_camera[:, :3, :3]),
-            self.calibration.pose_covariance(readings, name),
+            self.calibration.pose_covariance(readings, name, sides),
             self._out_of_range(readings),
         )
 

@@ -19,26 +19,40 @@ class Rays:
     directions: Array
 
 
-def project(active: ActiveCalibration, points: Array, readings: Array, camera: str | None) -> Array:
+def project(
+    active: ActiveCalibration,
+    points: Array,
+    readings: Array,
+    camera: str | None,
+    approached: Array | None = None,
+) -> Array:
     """Return the pixels (n, k, 2) of world points (k, 3; m) at readings (n, m); nan where the lens sees none.
 
-    Raises UnknownCameraError, LensUnknownError, ReadingsError.
+    `approached` (n, m) are the readings' sides, none known by default. Raises UnknownCameraError, LensUnknownError,
+    ReadingsError.
     """
     lens = active.lens(camera)
-    poses = active.poses(readings, camera).world_from_camera
+    poses = active.poses(readings, camera, approached).world_from_camera
     with np.errstate(all="ignore"):
         # Row vectors: p_camera = R^T (p_world - t).
         in_camera = (points[None] - poses[:, None, :3, 3]) @ poses[:, :3, :3]
         return project_points(in_camera, lens)
 
 
-def rays(active: ActiveCalibration, pixels: Array, readings: Array, camera: str | None) -> Rays:
+def rays(
+    active: ActiveCalibration,
+    pixels: Array,
+    readings: Array,
+    camera: str | None,
+    approached: Array | None = None,
+) -> Rays:
     """Return the rays in the world along which `pixels` (k, 2) look at readings (n, m).
 
-    Raises UnknownCameraError, LensUnknownError, ReadingsError.
+    `approached` (n, m) are the readings' sides, none known by default. Raises UnknownCameraError, LensUnknownError,
+    ReadingsError.
     """
     lens = active.lens(camera)
-    poses = active.poses(readings, camera).world_from_camera
+    poses = active.poses(readings, camera, approached).world_from_camera
     with np.errstate(all="ignore"):
         directions = pixel_rays(pixels, lens)
         return Rays(poses[:, :3, 3], directions[None] @ poses[:, :3, :3].transpose(0, 2, 1))

@@ -66,19 +66,22 @@ class PoseService:
             self._written[camera] = written
         return b'%s,"age_s":%.6f}' % (written[1], age)
 
-    def readings_now(self) -> Array:
-        """Return the latest readings (m,); raises as `now` does."""
+    def readings_now(self) -> tuple[Array, Array]:
+        """Return the latest readings (m,), and the sides they were approached from (m,); raises as `now` does."""
         snapshot = self._rig.snapshot
         self._require_fresh(snapshot)
-        return np.array(snapshot.readings, dtype=float)
+        return np.array(snapshot.readings, dtype=float), np.array(snapshot.approached)
 
-    def at(self, readings: ArrayLike, camera: str | None = None) -> bytes:
+    def at(
+        self, readings: ArrayLike, camera: str | None = None, approached: ArrayLike | None = None
+    ) -> bytes:
         """Return the poses at `readings` (n, m), as the JSON of the API's `PosesAtReadings`.
 
-        Raises NotCalibratedError, UnknownCameraError, ReadingsError.
+        Each was `approached` from a side (n, m), none known by default. Raises NotCalibratedError, UnknownCameraError,
+        ReadingsError.
         """
         active = self.active
-        poses = active.poses(np.asarray(readings, dtype=float), camera)
+        poses = active.poses(np.asarray(readings, dtype=float), camera, approached)
         return to_json(
             {
                 "calibration_id": active.id,
@@ -90,7 +93,8 @@ class PoseService:
     def _answer(
         self, active: ActiveCalibration, snapshot: RigSnapshot, camera: str | None
     ) -> Mapping[str, Any]:
-        poses = active.poses(np.array([snapshot.readings], dtype=float), camera)
+        readings = np.array([snapshot.readings], dtype=float)
+        poses = active.poses(readings, camera, np.array([snapshot.approached]))
         assert snapshot.timestamp is not None
         return {
             "timestamp": self._rig.utc.at(snapshot.timestamp)
@@ -125,6 +129,7 @@ def _pose_fields(poses: Poses, index: int) -> dict[str, Any]:
     world_from_camera = poses.world_from_camera[index]
     return {
         "readings": poses.readings[index].tolist(),
+        "approached": poses.approached[index].tolist(),
         "world_from_camera": world_from_camera.tolist(),
         "base_from_camera": poses.base_from_camera[index].tolist(),
         "position": world_from_camera[:3, 3].tolist(),

@@ -4,7 +4,7 @@ In the order in which a run goes:
 
     manager       one run at a time, under its own lease
     run           its states, from its start to its last word;  gate  where it waits while paused
-    survey        homing, sweeps and free views;  observation  one view;  approach  from which side axes came
+    survey        homing, sweeps and free views;  observation  one view
     conclusion    solving and verification;  worker  a thread for them that can be abandoned
     events        what it tells;  event_log  told in order, kept, followed
 """

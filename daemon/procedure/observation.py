@@ -8,8 +8,7 @@ from typing import Any
 
 from calib.detection import detect
 from calib.errors import DetectionError
-from daemon.procedure.approach import Approach, Side
-from daemon.rig import Rig, RigSnapshot
+from daemon.rig import Rig, RigSnapshot, Side
 from drivers.camera import Frame
 from drivers.errors import DeviceFaultError, MotionError
 
@@ -41,16 +40,13 @@ class Observer:
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
-        self._approach = Approach(list(rig.specs))
 
     async def go(self, targets: Mapping[str, float]) -> None:
         """Move axes to `targets` (reading units) and confirm by a fresh state that they stand there.
 
         Raises MotionError where they do not, and what `Rig.move` raises.
         """
-        before = {axis.spec.name: axis.position for axis in self._rig.snapshot.axes}
         await self._rig.move(targets)
-        self._approach.moved({name: at for name, at in before.items() if at is not None}, targets)
         standing = await self._standing()
         for name, target in targets.items():
             spec, position = self._rig.specs[name], standing.axis(name).position
@@ -80,7 +76,7 @@ class Observer:
         return Observation(
             frame=frame,
             readings=[position for position in settled.readings if position is not None],
-            approached=self._approach.sides,
+            approached=list(settled.approached),
             points=len(detection.ids),
             taken_at=self._rig.utc.at(frame.timestamp),
             settled=frame.timestamp - stood_at,

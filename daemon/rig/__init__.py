@@ -11,6 +11,6 @@ In the order in which a state travels:
 
 from daemon.rig.devices import Devices, make_devices
 from daemon.rig.rig import Rig
-from daemon.rig.snapshot import AxisSnapshot, DeviceSnapshot, RigSnapshot
+from daemon.rig.snapshot import AxisSnapshot, DeviceSnapshot, RigSnapshot, Side
 
-__all__ = ["AxisSnapshot", "DeviceSnapshot", "Devices", "Rig", "RigSnapshot", "make_devices"]
+__all__ = ["AxisSnapshot", "DeviceSnapshot", "Devices", "Rig", "RigSnapshot", "Side", "make_devices"]

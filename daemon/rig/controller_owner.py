@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from daemon.rig.device_owner import DeviceOwner
-from daemon.rig.snapshot import AxisSnapshot
+from daemon.rig.snapshot import AxisSnapshot, Side
 from daemon.rig.stop_latch import StopLatch
 from drivers.axis import Axis, AxisController, AxisSpec, AxisState
 from drivers.cancellation import finish
@@ -26,6 +26,7 @@ class _AxisRecord:
     spec: AxisSpec
     state: AxisState | None = None
     motion: asyncio.Task[None] | None = None
+    approached: Side = 0
     must_home: bool = False
     """A device that was away may have been moved or have miscounted: only homing makes it known again."""
     last_error: str | None = None
@@ -67,6 +68,7 @@ class ControllerOwner(DeviceOwner):
             timestamp=state.timestamp,
             moving=state.moving or in_motion,
             homed=state.homed and not record.must_home,
+            approached=record.approached,
             fault=state.fault,
             lost=self.lost,
             last_error=record.last_error,
@@ -86,7 +88,7 @@ class ControllerOwner(DeviceOwner):
     async def home(self, name: str) -> None:
         """Home one axis; after that its position is believed again."""
         await self._carry_out(name, lambda axis: axis.home())
-        self._axes[name].must_home = False
+        self._axes[name].must_home, self._axes[name].approached = False, 0
         self._publish()
 
     async def carry_out(self, name: str, action: Action) -> None:
@@ -142,9 +144,13 @@ class ControllerOwner(DeviceOwner):
             self._publish()
 
     async def _act(self, name: str, action: Action) -> None:
+        record = self._axes[name]
+        began, side = record.state, record.approached
+        record.approached = 0
         await action(self._controller.axes[name])
         # What is asked right after a motion must not find the state from before it.
         await self._read(name)
+        record.approached = _side(record.spec, side, began, record.state)
 
     async def _open(self) -> None:
         await self._controller.open()
@@ -179,7 +185,17 @@ class ControllerOwner(DeviceOwner):
 
     def _on_loss(self) -> None:
         for record in self._axes.values():
-            record.must_home = record.must_home or record.state is not None
+            record.must_home, record.approached = record.must_home or record.state is not None, 0
+
+
+def _side(spec: AxisSpec, before: Side, began: AxisState | None, ended: AxisState | None) -> Side:
+    """Return the side after a motion; an axis that was already there keeps the one from `before`."""
+    if began is None or ended is None or began.position is None or ended.position is None:
+        return 0
+    travel = ended.position - began.position
+    if abs(travel) <= spec.tolerance:
+        return before
+    return 1 if travel > 0 else -1
 
 
 async def _watch(motion: asyncio.Task[None]) -> None:

@@ -5,6 +5,9 @@ from typing import Literal
 
 from drivers.axis import AxisSpec
 
+Side = Literal[-1, 0, 1]
+"""From which an axis came to where it stands: 1 from below, -1 from above, 0 where that is not known."""
+
 
 @dataclass(frozen=True, slots=True)
 class AxisSnapshot:
@@ -18,6 +21,8 @@ class AxisSnapshot:
     """Time of the reading on the rig's clock (s); None before the first."""
     moving: bool = False
     homed: bool = False
+    approached: Side = 0
+    """By its latest motion; 0 while it moves, and where a motion did not end as it was meant to."""
     fault: str | None = None
     """What the device reports as its own fault, which a person must clear."""
     lost: str | None = None
@@ -49,6 +54,11 @@ class RigSnapshot:
     def readings(self) -> tuple[float | None, ...]:
         """The raw joint readings V, in chain order and each axis's own unit."""
         return tuple(axis.position for axis in self.axes)
+
+    @property
+    def approached(self) -> tuple[Side, ...]:
+        """From which side each axis came to its reading, in chain order."""
+        return tuple(axis.approached for axis in self.axes)
 
     @property
     def timestamp(self) -> float | None:

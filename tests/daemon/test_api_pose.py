@@ -101,6 +101,42 @@ async def test_many_poses_are_those_of_each(
         assert np.allclose(pose["world_from_camera"], expected, atol=1e-12)
 
 
+async def test_a_joint_with_play_is_answered_by_its_side(
+    calibrated: Service, client: httpx.AsyncClient
+) -> None:
+    poses = calibrated.poses
+    loose = {"backlash": [{"joint": "pan", "half_gap": 0.5}]}
+    document = poses.active.calibration.model_dump(mode="json", exclude_unset=True) | {"corrections": loose}
+    poses.activate(poses.prepare("loose", Calibration.model_validate(document)))
+    at = poses.active.calibration.world_from_camera
+    for target, side in ((3.0, 1), (1.0, -1), (2.0, 1)):
+        await calibrated.rig.move({"slide": 50.0, "pan": target})
+        pose = (await client.get("/pose")).json()
+        assert pose["approached"][1] == side
+        assert np.allclose(pose["world_from_camera"], at(pose["readings"], approached=[0, side]))
+    readings = [[50.0, 2.0], [50.0, 2.0]]
+    answer = await client.post("/pose", json={"readings": readings, "approached": [[0, 1], [0, 0]]})
+    known, unknown = answer.json()["poses"]
+    assert np.allclose(known["world_from_camera"], pose["world_from_camera"])
+    assert np.allclose(unknown["world_from_camera"], at(readings[1]))
+    assert np.trace(unknown["covariance"]) > 10 * np.trace(known["covariance"])
+    plain = (await client.post("/pose", json={"readings": readings[:1]})).json()["poses"][0]
+    assert plain["covariance"] == unknown["covariance"]
+    project = {"points": [[0.05, 0.05, 0.0]]}
+    now = (await client.post("/project", json=project)).json()["pixels"]
+    anywhere = (await client.post("/project", json=project | {"readings": readings[:1]})).json()["pixels"]
+    assert np.linalg.norm(np.subtract(now, anywhere)) > 1
+
+
+@pytest.mark.parametrize("sides", [[[1]], [[1, 0], [1, 0]], [[1, 0, 0]]])
+async def test_sides_that_do_not_fit_are_refused(
+    calibrated: Service, client: httpx.AsyncClient, sides: list[list[int]]
+) -> None:
+    answer = await client.post("/pose", json={"readings": [[1.0, 2.0]], "approached": sides})
+    assert answer.status_code == 422
+    assert answer.json()["code"] == "readings_invalid"
+
+
 @pytest.mark.parametrize("readings", [[[1.0]], [[1.0, 2.0], [1.0, 2.0, 3.0]]])
 async def test_readings_that_do_not_fit_are_refused(
     calibrated: Service, client: httpx.AsyncClient, readings: list[list[float]]

@@ -43,6 +43,30 @@ async def test_a_move_ends_where_all_axes_stand_at_their_targets(rig: Rig) -> No
     assert not snapshot.moving
 
 
+async def test_the_rig_knows_from_which_side_an_axis_came(rig: Rig) -> None:
+    await home_all(rig)
+    assert rig.snapshot.approached == (0, 0)
+    await rig.move({"slide": 30.0, "pan": -5.0})
+    assert rig.snapshot.approached == (1, -1)
+    await rig.move({"slide": 20.0})
+    await rig.move({"slide": 20.0})
+    await rig.jog("pan", 1.0)
+    assert rig.snapshot.approached == (-1, 1)
+    await rig.home("pan")
+    assert rig.snapshot.approached == (-1, 0)
+
+
+async def test_a_motion_that_was_stopped_leaves_the_side_open(rig: Rig) -> None:
+    await home_all(rig)
+    await rig.move({"slide": 30.0})
+    motion = asyncio.create_task(rig.move({"slide": 90.0}))
+    await until(rig, lambda snapshot: snapshot.axis("slide").moving)
+    await rig.stop_axes(["slide"])
+    with pytest.raises(MotionStoppedError):
+        await motion
+    assert rig.snapshot.approached[0] == 0
+
+
 async def test_an_unhomed_axis_keeps_all_others_from_moving(rig: Rig) -> None:
     await rig.home("slide")
     with pytest.raises(NotHomedError, match="'pan' is not homed"):

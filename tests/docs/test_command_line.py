@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import typer
 
-from daemon.cli.main import app, main, spread_readings
+from daemon.cli.main import app, main, spread_numbers
 from tests.docs.pages import Block, blocks, page, pages
 
 PAGE = "reference/command-line.md"
@@ -45,7 +45,7 @@ LINES = list(_lines())
 @pytest.mark.parametrize(("block", "line"), LINES, ids=[f"{block}-{line}" for block, line in LINES])
 def test_a_command_line_parses(block: Block, line: str) -> None:
     words = shlex.split(line.replace("[", "").replace("]", ""))
-    context = ROOT.make_context("activecam", spread_readings(words[1:]))
+    context = ROOT.make_context("activecam", spread_numbers(words[1:]))
     command, name = ROOT, "activecam"
     rest = [*context._protected_args, *context.args]
     while hasattr(command, "commands"):
