@@ -18,7 +18,7 @@ data flows through them:
     corrections, warp            imperfect joints and targets;  stated_corrections  as a calibration states them
     links, dh, document          D-H and base read off the screws, and all written down: calibration
     pose_covariance              how sure a pose is
-    residuals, quality, verification, paper      is it good?
+    residuals, quality, verdict, verification, paper      is it good?
     solver                       from a session to a calibration
 """
 

@@ -11,20 +11,20 @@ LENS = ("focal_length", "principal_point")
 
 
 def weakness_in_words(weakness: Weakness, units: Mapping[str, str]) -> str:
-    """Return a sentence that names what is badly known, how badly, and what would make it known best.
+    """Return a sentence that says what is weak and what would make it known best; `units` are the joints' readings'."""
+    return what_is_weak(weakness) + _remedy(weakness, units)
 
-    `units` are the joints' reading units.
-    """
+
+def what_is_weak(weakness: Weakness) -> str:
+    """Return a sentence that names what is badly known, and how badly."""
     names = [_name(one) for one in weakness.known]
+    if len(names) == 1:
+        if weakness.undetermined:
+            return f"the views do not tell {names[0]}"
+        return f"the views tell {names[0]} to {_size(weakness.known[0])} only"
     if not weakness.undetermined:
         names = [f"{name} ({_size(one)})" for name, one in zip(names, weakness.known, strict=True)]
-    if len(names) > 1:
-        sentence = f"{', '.join(names[:-1])} and {names[-1]} can't be told apart"
-    elif weakness.undetermined:
-        sentence = f"the views do not tell {names[0]}"
-    else:
-        sentence = f"the views tell {_name(weakness.known[0])} to {_size(weakness.known[0])} only"
-    return sentence + _remedy(weakness, units)
+    return f"{', '.join(names[:-1])} and {names[-1]} can't be told apart"
 
 
 def _name(known: Known) -> str:

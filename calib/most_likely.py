@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from math import sqrt
 from operator import attrgetter
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from calib.corrections import Corrections, coefficient_paths
 from calib.likelihood.building import Start
 from calib.likelihood.document_covariance import document_jacobian
+from calib.likelihood.measurements import PointViews
+from calib.likelihood.problem import Problem
 from calib.likelihood.refinement import Refined, refine
 from calib.likelihood.weakness import weaknesses
 from calib.observations import Observation
@@ -44,10 +47,23 @@ def most_likely(
         covariance=_document_covariance(session, refined),
         left_out=(aside.views, aside.points),
         held_out=refined.held_out,
+        noise_px=_point_noise(refined.problem),
         weaknesses=weaknesses(session, refined.problem, refined.weights, refined.descent, refined.noise**2),
         corrections=Corrections(found.models, state.corrections),
         warp=dict(zip(found.warp, state.warp.tolist(), strict=True)),
     )
+
+
+def _point_noise(problem: Problem) -> float | None:
+    """Return how far single points lie off (rms, px) for no other reason than noise; None where there are none."""
+    squares, count = 0.0, 0.0
+    for group in problem.groups:
+        if isinstance(group.data, PointViews):
+            # The covariance of a point is that of W^-1 times unit noise.
+            spread = (np.linalg.inv(group.data.whitening) ** 2).sum(axis=(2, 3))
+            squares += float((spread * group.data.present).sum())
+            count += float(group.data.present.sum())
+    return sqrt(squares / count) if count else None
 
 
 def _as_the_chain_has_it(

@@ -1,72 +1,155 @@
 """How well a calibration explains the views that it was made from, and those held out."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from math import sqrt
-from typing import Any
+from typing import Literal
 
-from calib.calibration import Calibration, Quality, ViewQuality
-from calib.likelihood.held_out import HeldOut
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.calibration import Calibration, JointQuality, MeanAndMax, Quality, ViewQuality
 from calib.observations import Observation
 from calib.residuals import ViewResidual, root_mean_square, view_residuals
 from calib.session import Session
+from calib.solution import Solution
+from calib.verdict import judgement_and_verdict
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Miss:
+    """How far `points` points lie from where they are predicted (rms), or a given pose; None for what is not there."""
+
+    points: int
+    pixels: float | None
+    position: float | None
+    rotation: float | None
+
+    @classmethod
+    def of(cls, residual: ViewResidual, bad: Collection[tuple[int, int]] = ()) -> "Miss":
+        """Return the miss of one view, points that are `bad` (view, id) not counted."""
+        good = np.array([(residual.view, point) not in bad for point in residual.ids.tolist()], dtype=bool)
+        errors = residual.errors[good]
+        pixels = float(np.sqrt((errors**2).mean())) if len(errors) else None
+        return cls(len(errors), pixels, residual.position, residual.rotation)
+
+    @classmethod
+    def over(cls, misses: Iterable["Miss"]) -> "Miss":
+        """Return the miss of several views: pixels over all points, positions and rotations on the mean."""
+        misses = list(misses)
+        seen = [(miss.points, miss.pixels) for miss in misses if miss.pixels is not None]
+        points = sum(count for count, _ in seen)
+        return cls(
+            points,
+            sqrt(sum(count * pixels**2 for count, pixels in seen) / points) if points else None,
+            _mean([miss.position for miss in misses]),
+            _mean([miss.rotation for miss in misses]),
+        )
 
 
 def judged(
     calibration: Calibration,
     session: Session,
     observations: Sequence[Observation],
-    left_one_out: Sequence[HeldOut],
+    solution: Solution,
     warnings: list[str],
 ) -> Quality:
     """Return how well the calibration explains each view, those of the fit and those held out.
 
-    Where no view is marked `verify`, `left_one_out` tells how well each is predicted by the others.
+    Where no view is marked `verify`, the solution tells how well each is predicted by the others. What was set aside
+    counts nowhere but in its own view.
     """
     residuals = view_residuals(calibration, session, observations)
-    others = {error.view: error.rms_px for error in left_one_out}
-    views = [
-        ViewQuality(
-            view=residual.view,
-            joint=session.views[residual.view].joint,
-            use=session.views[residual.view].use,
-            rms_px=root_mean_square([residual]),
-            position_m=residual.position,
-            rotation_rad=residual.rotation,
-            held_out_px=others.get(residual.view),
+    aside, bad = set(solution.left_out[0]), set(solution.left_out[1])
+    uses = {residual.view: session.views[residual.view].use for residual in residuals}
+    fitted = {r.view: Miss.of(r, bad) for r in residuals if uses[r.view] == "fit" and r.view not in aside}
+    verify = {r.view: Miss.of(r) for r in residuals if uses[r.view] == "verify"}
+    by_others = {
+        error.view: Miss(fitted[error.view].points, error.rms_px, error.position_m, error.rotation_rad)
+        for error in solution.held_out
+    }
+    held_out = verify or by_others
+    held_out_by: Literal["verify", "leave_one_view_out"] = "verify" if verify else "leave_one_view_out"
+    views = []
+    for residual in residuals:
+        alone = by_others.get(residual.view)
+        views.append(
+            ViewQuality(
+                view=residual.view,
+                joint=session.views[residual.view].joint,
+                use=uses[residual.view],
+                rms_px=root_mean_square([residual]),
+                position_m=residual.position,
+                rotation_rad=residual.rotation,
+                held_out_px=alone and alone.pixels,
+                held_out_position_m=alone and alone.position,
+                held_out_rotation_rad=alone and alone.rotation,
+                set_aside=residual.view in aside,
+            )
         )
-        for residual in residuals
-    ]
-    fit, verify = (
-        [residual for residual in residuals if session.views[residual.view].use == use]
-        for use in ("fit", "verify")
+    every, out = Miss.over(fitted.values()), Miss.over(held_out.values())
+    position, rotation = _pose_std(calibration, session, list(fitted))
+    quality = Quality(
+        rms_px=every.pixels,
+        held_out_rms_px=out.pixels,
+        held_out_position_m=out.position,
+        held_out_rotation_rad=out.rotation,
+        held_out_by=held_out_by if held_out else None,
+        noise_px=solution.noise_px,
+        position_std_m=position,
+        rotation_std_rad=rotation,
+        joints=_by_joint(session, fitted, held_out),
+        views=views,
+        warnings=warnings,
     )
-    held_out = _by_views(verify) if verify else _by_the_others(left_one_out, fit)
-    return Quality(rms_px=root_mean_square(fit), **held_out, views=views, warnings=warnings)
+    judgement, verdict = judgement_and_verdict(quality, session.complete, solution.weaknesses)
+    return quality.model_copy(update={"judgement": judgement, "verdict": verdict})
 
 
-def _by_views(verify: Sequence[ViewResidual]) -> dict[str, Any]:
-    return {
-        "held_out_rms_px": root_mean_square(verify),
-        "held_out_position_m": _mean([residual.position for residual in verify]),
-        "held_out_rotation_rad": _mean([residual.rotation for residual in verify]),
-        "held_out_by": "verify",
-    }
+def _by_joint(session: Session, fitted: dict[int, Miss], held_out: dict[int, Miss]) -> list[JointQuality]:
+    names: list[str | None] = [*(joint.name for joint in session.joints), None]
+    rows = []
+    for name in names:
+        own = [miss for view, miss in fitted.items() if session.views[view].joint == name]
+        unseen = [miss for view, miss in held_out.items() if session.views[view].joint == name]
+        if own or unseen:
+            every, out = Miss.over(own), Miss.over(unseen)
+            rows.append(
+                JointQuality(
+                    joint=name,
+                    views=len(own),
+                    rms_px=every.pixels,
+                    position_m=every.position,
+                    rotation_rad=every.rotation,
+                    held_out_px=out.pixels,
+                    held_out_position_m=out.position,
+                    held_out_rotation_rad=out.rotation,
+                )
+            )
+    return rows
 
 
-def _by_the_others(left_one_out: Sequence[HeldOut], fit: Sequence[ViewResidual]) -> dict[str, Any]:
-    if not left_one_out:
-        return {}
-    points = {residual.view: len(residual.errors) for residual in fit}
-    squares = [(points[error.view], error.rms_px**2) for error in left_one_out if error.rms_px is not None]
-    count = sum(number for number, _ in squares)
-    return {
-        "held_out_rms_px": sqrt(sum(number * square for number, square in squares) / count)
-        if count
-        else None,
-        "held_out_position_m": _mean([error.position_m for error in left_one_out]),
-        "held_out_rotation_rad": _mean([error.rotation_rad for error in left_one_out]),
-        "held_out_by": "leave_one_view_out",
-    }
+def _pose_std(
+    calibration: Calibration, session: Session, views: Sequence[int]
+) -> tuple[MeanAndMax | None, MeanAndMax | None]:
+    """Return how sure the pose is at the readings of these views: its position (m), its rotation (rad)."""
+    positions, rotations = [], []
+    for index, camera in enumerate(session.cameras):
+        own = [session.views[view] for view in views]
+        readings = [view.readings for view in own if session.camera_index(view) == index]
+        covariance = calibration.pose_covariance(readings, camera.name) if readings else None
+        if covariance is None:
+            continue
+        variances = np.diagonal(covariance, axis1=1, axis2=2)
+        rotations += np.sqrt(variances[:, :3].sum(axis=1)).tolist()
+        positions += np.sqrt(variances[:, 3:].sum(axis=1)).tolist()
+    return _spread(positions), _spread(rotations)
+
+
+def _spread(values: Sequence[float]) -> MeanAndMax | None:
+    return MeanAndMax(mean=sum(values) / len(values), max=max(values)) if values else None
 
 
 def _mean(errors: Sequence[float | None]) -> float | None:

@@ -1,7 +1,7 @@
 """How far a view is from what a calibration predicts of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +25,16 @@ Array = NDArray[np.float64]
 class ViewResidual:
     """One view against the calibration.
 
-    `pixels` (n, 2) are predicted less measured points (px), None where the view has none. `predicted` and
-    `measured` are world_from_camera (4, 4), `measured` from this view alone, None where nobody asked.
+    `pixels` (n, 2) are predicted less measured points (px) and `ids` (n,) say which, None and empty where the view has
+    none. `predicted` and `measured` are world_from_camera (4, 4), `measured` from this view alone, None where nobody
+    asked.
     """
 
     view: int
     pixels: Array | None
     predicted: Array
     measured: Array | None
+    ids: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def errors(self) -> Array:
@@ -118,6 +120,7 @@ def _of_points(
             pixels[row],
             predicted[row],
             measured_pose(observation, target, points, lens) if measure_pose and calibration.joints else None,
+            observation.ids,
         )
         for row, observation in enumerate(seen)
     ]

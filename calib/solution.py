@@ -21,9 +21,10 @@ class Solution:
 
     `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
     their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
-    well each view is predicted by the fit of all others, `weaknesses` what the views leave in the dark. `prior` (k, k)
-    is what a nominal model knows of the chain, and `world_from_base` (4, 4) its base. `corrections` are what imperfect
-    joints add to their readings, and `warp` the height (m) of each shape of the target's.
+    well each view is predicted by the fit of all others, `weaknesses` what the views leave in the dark, `noise_px`
+    how much single points scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
+    (4, 4) its base. `corrections` are what imperfect joints add to their readings, and `warp` the height (m) of each
+    shape of the target's.
     """
 
     chain: Chain
@@ -34,6 +35,7 @@ class Solution:
     left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
     held_out: Sequence[HeldOut] = ()
     weaknesses: Sequence[Weakness] = ()
+    noise_px: float | None = None
     prior: Array | None = None
     world_from_base: Array | None = None
     corrections: Corrections = NO_CORRECTIONS

@@ -57,7 +57,7 @@ def solve(
             warnings += lens_in_words(camera.name, std)
     warnings += [*left_out_in_words(solution), *observed.missing]
     calibration = document(session, method, solution, Quality())
-    quality = judged(calibration, session, observed.observations, solution.held_out, warnings)
+    quality = judged(calibration, session, observed.observations, solution, warnings)
     corrected = corrections_in_words(calibration.corrections, session.joints, target_points(session.target))
     quality = quality.model_copy(update={"corrections": corrected})
     return calibration.model_copy(update={"quality": quality})

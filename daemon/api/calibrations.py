@@ -31,6 +31,10 @@ class CalibrationEntry(BaseModel):
     method: str = Field(examples=["ml"])
     active: bool = Field(description="Whether poses are computed from it.")
     run_id: str | None = Field(description="The run that found it.")
+    judgement: str | None = Field(
+        description="good, usable, poor, or unknown; null where it was not judged.", examples=["good"]
+    )
+    verdict: str | None = Field(description="What the judgement rests on, in a sentence.")
 
     @classmethod
     def of(cls, calibration: CalibrationSummary) -> Self:
@@ -41,6 +45,8 @@ class CalibrationEntry(BaseModel):
             method=calibration.method,
             active=calibration.active,
             run_id=calibration.run_id,
+            judgement=calibration.judgement,
+            verdict=calibration.verdict,
         )
 
 
@@ -54,7 +60,7 @@ class CalibrationDocument(CalibrationEntry):
     def whole(cls, record: CalibrationRecord) -> Self:
         """Describe a calibration with its document."""
         return cls(
-            **CalibrationEntry.of(record).model_dump(),
+            **CalibrationEntry.of(record.summary()).model_dump(),
             calibration=json.loads(record.document),
             verification=None if record.verification is None else json.loads(record.verification),
         )
@@ -87,4 +93,4 @@ async def get_calibration(calibration_id: CalibrationId, service: ServiceDep) ->
 )
 async def activate_calibration(calibration_id: CalibrationId, service: ServiceDep) -> CalibrationEntry:
     """Make this calibration the active one, now and after every restart."""
-    return CalibrationEntry.of(await service.activate(calibration_id))
+    return CalibrationEntry.of((await service.activate(calibration_id)).summary())

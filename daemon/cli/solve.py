@@ -14,6 +14,7 @@ from calib.errors import FormatError
 from calib.parameters import Held
 from calib.session_writer import keep_origin
 from daemon.cli.console import output, progress_line, warn
+from daemon.cli.quality_tables import print_quality
 
 
 class Method(StrEnum):
@@ -107,20 +108,4 @@ def print_calibration(calibration: Calibration) -> None:
     if calibration.joints:
         output.print(joints)
     output.print(lenses)
-    quality = calibration.quality
-    if quality.rms_px is not None:
-        output.print(
-            f"Residual of the fit: {quality.rms_px:.3f} px rms (a small one alone does not say good)"
-        )
-    verdict = [
-        text.format(factor * value)
-        for value, factor, text in (
-            (quality.held_out_rms_px, 1, "{:.3f} px rms"),
-            (quality.held_out_position_m, 1e3, "{:.3f} mm"),
-            (quality.held_out_rotation_rad, 1e3, "{:.3f} mrad"),
-        )
-        if value is not None
-    ]
-    if verdict:
-        by = "held-out views" if quality.held_out_by == "verify" else "each view by all others"
-        output.print(f"Prediction of {by}: {', '.join(verdict)}")
+    print_quality(calibration.quality)

@@ -1,5 +1,6 @@
 """What the store gives out: records that no longer touch the database."""
 
+import json
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -42,8 +43,8 @@ class RunRecord:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationSummary:
-    """A stored calibration without its document."""
+class StoredCalibration:
+    """What a calibration is stored under."""
 
     id: str
     created_at: datetime
@@ -53,10 +54,31 @@ class CalibrationSummary:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationRecord(CalibrationSummary):
+class CalibrationSummary(StoredCalibration):
+    """A stored calibration without its document, but for its quality in one word and in a sentence."""
+
+    judgement: str | None
+    verdict: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRecord(StoredCalibration):
     """A stored calibration."""
 
     document: str
     """The calibration's JSON."""
     verification: str | None = None
     """What the held-out views said (JSON), None where there were none."""
+
+    def summary(self) -> CalibrationSummary:
+        """Return it without its document."""
+        quality = json.loads(self.document).get("quality", {})
+        return CalibrationSummary(
+            self.id,
+            self.created_at,
+            self.method,
+            self.active,
+            self.run_id,
+            quality.get("judgement"),
+            quality.get("verdict"),
+        )

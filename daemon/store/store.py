@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
-from sqlalchemy import select, update
+from sqlalchemy import ColumnElement, case, func, select, update
 from sqlalchemy.orm import Session
 
 from daemon.errors import UnknownCalibrationError, UnknownRunError
@@ -98,6 +98,8 @@ class Store:
             CalibrationRow.method,
             CalibrationRow.active,
             CalibrationRow.run_id,
+            _of_document("$.quality.judgement"),
+            _of_document("$.quality.verdict"),
         ).order_by(CalibrationRow.created_at.desc(), CalibrationRow.id.desc())
         return await self._database.transact(
             lambda session: [CalibrationSummary(*row) for row in session.execute(columns)]
@@ -129,6 +131,12 @@ class Store:
             return _calibration(row)
 
         return await self._database.transact(work)
+
+
+def _of_document(path: str) -> ColumnElement[str | None]:
+    """Select a text in the stored document; null where it is not there, or the document is damaged."""
+    document = CalibrationRow.document
+    return case((func.json_valid(document) == 1, func.json_extract(document, path)), else_=None)
 
 
 def _add_active(session: Session, calibration: CalibrationRecord) -> None:

@@ -58,6 +58,8 @@ MODELS: dict[str, type[BaseModel]] = {
     "### Target warp": stated_corrections.TargetWarp,
     "### Covariance": calib_file.Covariance,
     "### Quality": calib_file.Quality,
+    "### A joint's quality": calib_file.JointQuality,
+    "### A mean and a maximum": calib_file.MeanAndMax,
     "### A view's quality": calib_file.ViewQuality,
 }
 
