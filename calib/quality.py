@@ -137,9 +137,10 @@ def _pose_std(
     """Return how sure the pose is at the readings of these views: its position (m), its rotation (rad)."""
     positions, rotations = [], []
     for index, camera in enumerate(session.cameras):
-        own = [session.views[view] for view in views]
-        readings = [view.readings for view in own if session.camera_index(view) == index]
-        covariance = calibration.pose_covariance(readings, camera.name) if readings else None
+        own = [view for view in views if session.camera_index(session.views[view]) == index]
+        if not own:
+            continue
+        covariance = calibration.pose_covariance(session.readings()[own], camera.name, session.sides()[own])
         if covariance is None:
             continue
         variances = np.diagonal(covariance, axis1=1, axis2=2)

@@ -73,13 +73,16 @@ def quantities(
     distances = [max(float(np.linalg.norm(pose[:3, 3] - centre)), 1e-9) for pose in amid.poses]
     found: list[Quantity] = []
     for joint, name in enumerate(joints):
-        found.append(Quantity("scale", name, _picked(len(layout), layout.scales[joint]) / RELATIVE, RELATIVE))
+        scale = np.zeros((1, len(layout)))
+        scale[0, layout.scales[joint]] = 1 / RELATIVE
+        found.append(Quantity("scale", name, scale, RELATIVE))
         found += _axis(state, amid, joint, name, distances[0])
     for camera, name in enumerate(cameras):
         lens = state.lenses[camera]
         if lens is not None:
-            first = layout.lenses[camera].start
-            numbers = _picked(len(layout), first, 4) / np.repeat(lens[:2].mean(), 4)[:, None] / RELATIVE
+            numbers = np.zeros((4, len(layout)))
+            numbers[:, layout.lenses[camera]] = layout.lens_changes[camera][:4]
+            numbers /= RELATIVE * lens[:2].mean()
             found.append(Quantity("focal_length", name, numbers[:2], RELATIVE))
             found.append(Quantity("principal_point", name, numbers[2:], RELATIVE))
         own = adjoint(inverse(amid.poses[camera])) @ amid.motions[camera]
@@ -87,10 +90,6 @@ def quantities(
         found.append(Quantity("stand", name, own[3:] / reach, reach))
         found.append(Quantity("look", name, own[:3] / ANGLE, ANGLE))
     return found
-
-
-def _picked(count: int, first: int, length: int = 1) -> Array:
-    return np.eye(count)[first : first + length]
 
 
 def _axis(state: State, amid: Amid, joint: int, name: str, distance: float) -> list[Quantity]:

@@ -32,10 +32,13 @@ def usual_rig(problem: Problem, descent: Descent, weights: Weights) -> Descent:
     drawn = False
     for group in problem.groups:
         part, values = problem.layout.lenses[group.camera], descent.estimate.state.lenses[group.camera]
-        if values is None or group.lens is None or not problem.free[part].any():
+        if values is None or group.lens is None or not problem.free[part].any() or problem.prior[part].any():
             continue
+        change = problem.layout.lens_changes[group.camera]
         width, height = group.lens.width or 2 * values[2], group.lens.height or 2 * values[3]
-        prior[part, part], travel[part] = _prior(float(width), float(height), values)
+        root, away = _prior(float(width), float(height), values)
+        prior[part, part] = change.T @ root.T @ root @ change
+        travel[part] = np.linalg.lstsq(root @ change, root @ away, rcond=None)[0]
         drawn = True
     if not drawn:
         return descent
@@ -47,12 +50,11 @@ def usual_rig(problem: Problem, descent: Descent, weights: Weights) -> Descent:
 
 
 def _prior(width: float, height: float, values: Array) -> tuple[Array, Array]:
-    """Return the information (l, l) that draws a lens to the usual one, and how far `values` (l,) are from that."""
+    """Return what whitens (l, l) how far a lens is from the usual one, and how far `values` (l,) are from that."""
     longer = max(width, height)
     usual = np.array([longer, longer, (width - 1) / 2, (height - 1) / 2, *np.zeros(len(values) - 4)])
-    mean, difference = np.zeros(len(values)), np.zeros(len(values))
-    mean[:2], difference[:2] = 0.5 / (FOCAL * longer), np.array([1, -1]) / (ASPECT * longer)
-    information = np.outer(mean, mean) + np.outer(difference, difference)
-    spread = np.array([CENTRE * longer] * 2 + [BEND] * (len(values) - 4))
-    information[2:, 2:] += np.diag(spread**-2.0)
-    return information, values - usual
+    spread = np.array([1.0, 1.0, *[CENTRE * longer] * 2, *[BEND] * (len(values) - 4)])
+    root = np.diag(1 / spread)
+    root[0, :2] = 0.5 / (FOCAL * longer)
+    root[1, :2] = np.array([1, -1]) / (ASPECT * longer)
+    return root, values - usual
