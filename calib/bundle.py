@@ -82,15 +82,13 @@ def _reduced(blocks: Blocks, damping: float) -> tuple[Array, Array, tuple[Array,
     own = blocks.hessian[:, :6, :6]
     own = own + damping * np.eye(6) * np.diagonal(own, axis1=1, axis2=2)[:, None, :]
     mixed = blocks.hessian[:, :6, 6:]
-    slope = np.linalg.solve(own, mixed)
-    offset = np.linalg.solve(own, blocks.gradient[:, :6, None])[..., 0]
-    information = (blocks.hessian[:, 6:, 6:] - np.swapaxes(mixed, 1, 2) @ slope).sum(axis=0)
-    gradient = (blocks.gradient[:, 6:] - (np.swapaxes(mixed, 1, 2) @ offset[..., None])[..., 0]).sum(axis=0)
-    return (
-        np.asarray(information),
-        np.asarray(gradient),
-        (np.asarray(slope, float), np.asarray(offset, float)),
-    )
+    solved = np.linalg.solve(own, np.concatenate([mixed, blocks.gradient[:, :6, None]], axis=2))
+    slope, offset = np.asarray(solved[..., :-1], float), np.asarray(solved[..., -1], float)
+    # All views' rows together: one product of matrices.
+    rows = mixed.reshape(-1, mixed.shape[2])
+    information = blocks.hessian[:, 6:, 6:].sum(axis=0) - rows.T @ slope.reshape(rows.shape)
+    gradient = blocks.gradient[:, 6:].sum(axis=0) - rows.T @ offset.ravel()
+    return information, gradient, (slope, offset)
 
 
 def _step(

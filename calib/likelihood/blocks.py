@@ -56,16 +56,20 @@ def point_blocks(
     points += normal[..., None] * bulge[:, None]
     x, y, z = points = np.swapaxes(points, 0, 1)
     pixels, by_point, by_lens = pixel_terms(points, lens, model)
+    misfit = pixels + np.moveaxis(offsets - seen.pixels, -1, 0)
+    root = np.sqrt(weights)
+    _whiten(misfit, seen.whitening)
+    for derivative in (by_point, by_lens):
+        _whiten(derivative, seen.whitening * root[..., None, None])
     # A twist of the camera moves a point the other way: d point = point x omega - rho.
     by_x, by_y, by_z = by_point[:, 0], by_point[:, 1], by_point[:, 2]
     by_turn = [by_y * z - by_z * y, by_z * x - by_x * z, by_x * y - by_y * x]
     by_normal = (by_point * normal.T[..., None]).sum(axis=1)
     by_bulge = [by_normal * shape for shape in np.moveaxis(bulges, -1, 0)]
     local = [*by_turn, -by_x, -by_y, -by_z, *np.swapaxes(by_lens, 0, 1), *by_bulge]
-    root = np.sqrt(weights)
-    misfit = pixels + np.moveaxis(offsets - seen.pixels, -1, 0)
-    residuals = _whitened(seen.whitening, misfit[:, :, None])[:, 0]
-    jacobian = _whitened(seen.whitening * root[..., None, None], np.stack(local, axis=2))
+    jacobian = np.empty((len(poses), len(local), seen.present.shape[1], 2))
+    np.stack(local, axis=1, out=jacobian.transpose(3, 1, 0, 2))
+    residuals = np.stack([*misfit], axis=-1)
     aside = weights == 0
     if aside.any():
         # What is set aside may be anything, even behind the camera.
@@ -108,12 +112,12 @@ def disk_offsets(seen: PointViews, poses: Array, lens: Intrinsics, diameter: flo
     return offsets
 
 
-def _whitened(whitening: Array, rows: Array) -> Array:
-    """Return W (n, q, 2, 2) times what moves each coordinate of the points (2, n, d, q), as (n, d, q, 2)."""
-    product = np.empty((*rows.shape[1:], 2))
-    for i in range(2):
-        product[..., i] = whitening[:, None, :, i, 0] * rows[0] + whitening[:, None, :, i, 1] * rows[1]
-    return product
+def _whiten(rows: Array, whitening: Array) -> None:
+    """Multiply what belongs to the coordinates of points, `rows` (2, ..., n, q), by `whitening` (n, q, 2, 2)."""
+    rows[1] *= whitening[..., 1, 1]
+    if whitening[..., 1, 0].any():
+        rows[1] += whitening[..., 1, 0] * rows[0]
+    rows[0] *= whitening[..., 0, 0]
 
 
 def _blocks(residuals: Array, weighted: Array, transposed: Array) -> Blocks:

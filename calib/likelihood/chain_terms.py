@@ -44,7 +44,7 @@ def chain_terms(
     after = np.broadcast_to(inverse(state.mounts[camera]), (count, 4, 4))
     carried = adjoint(after)
     for joint in reversed(range(link)):
-        before = after @ inverse(chain.motion(joint, corrected[:, joint]))
+        before = after @ chain.motion(joint, -corrected[:, joint])
         carried_before = adjoint(before)
         by_parameter[:, :, layout.shapes[joint]] = (carried_before - carried) @ joint_basis(chain, joint)
         turning = carried_before @ joint_screw(chain, joint) * chain.scales[joint]

@@ -16,8 +16,8 @@ class PointViews:
     """The point measurements of one camera's n views, padded to q points each.
 
     `views` (n,) are places in the session, `ids` (n, q) the points', `world` (n, q, 3) where these are (m),
-    `pixels` (n, q, 2) where they are seen, `whitening` (n, q, 2, 2) W with W^T W the inverse of each point's
-    covariance, `present` (n, q) 1 for a point and 0 for padding. `disk` (n,) tells whose pixels are
+    `pixels` (n, q, 2) where they are seen, `whitening` (n, q, 2, 2) the lower triangular W with W^T W the inverse
+    of each point's covariance, `present` (n, q) 1 for a point and 0 for padding. `disk` (n,) tells whose pixels are
     centroids of disks.
     """
 

@@ -137,27 +137,30 @@ def point_noise(blocks: Blocks, present: Array) -> float:
 
 def _freed(blocks: Blocks, present: Array) -> Freed:
     """Free each view's pose by Tukey's regression, started from least absolute misfits."""
-    count, points = present.shape
-    misfit = blocks.residuals.reshape(count, points, 2)
-    flat, right = blocks.jacobian[:, :, :6], misfit.reshape(count, -1, 1)
-    weight = present / np.maximum(np.linalg.norm(misfit, axis=-1), 1e-12)
+    flat, right = blocks.jacobian[:, :, :6], blocks.residuals.reshape(len(present), -1, 1)
+    transposed, square = np.swapaxes(flat, 1, 2), _squares(right)
+    weight = present / np.maximum(np.sqrt(square), 1e-12)
     for _ in range(FREEING_PASSES):
-        weighted = np.swapaxes(flat * np.repeat(weight, 2, axis=1)[..., None], 1, 2)
+        weighted = transposed * np.repeat(weight, 2, axis=1)[:, None]
         shift = -np.linalg.solve(weighted @ flat, weighted @ right)
-        left = (right + flat @ shift).reshape(misfit.shape)
-        distance = np.linalg.norm(left, axis=-1)
-        typical = _median(distance, present)
-        reach = TUKEY * np.maximum(typical, 1e-12)[:, None] / np.sqrt(MEDIAN_OF_TWO)
-        weight = present * np.maximum(1 - (distance / reach) ** 2, 0) ** 2
-    kept = np.repeat(present * (distance < reach), 2, axis=1)[..., None]
-    return Freed(shift[..., 0], np.swapaxes(flat * kept, 1, 2) @ flat, distance**2)
+        square = _squares(right + flat @ shift)
+        typical = np.maximum(_median(square, present), 1e-24)
+        reach = TUKEY**2 / MEDIAN_OF_TWO * typical[:, None]
+        weight = present * np.maximum(1 - square / reach, 0) ** 2
+    kept = np.repeat(weight > 0, 2, axis=1)[:, None]
+    return Freed(np.asarray(shift[..., 0], float), (transposed * kept) @ flat, square)
+
+
+def _squares(misfits: Array) -> Array:
+    """Return the squared misfits of points (n, q) from those of their coordinates (n, 2 q, 1)."""
+    return np.asarray(misfits[:, ::2, 0] ** 2 + misfits[:, 1::2, 0] ** 2)
 
 
 def _median(values: Array, present: Array) -> Array:
     """Return the median (n,) of those `values` (n, q) that are `present`."""
     ordered = np.sort(np.where(present > 0, values, np.inf), axis=1)
     middle = np.maximum(present.sum(axis=1).astype(int) - 1, 0) // 2
-    return np.asarray(np.take_along_axis(ordered, middle[:, None], axis=1)[:, 0])
+    return np.asarray(ordered[np.arange(len(ordered)), middle])
 
 
 def _given(blocks: Blocks) -> Freed:
