@@ -17,7 +17,7 @@ data flows through them:
     likelihood/, most_likely     the fit;  advice  what it does not tell, in words
     corrections, warp            imperfect joints and targets;  stated_corrections  as a calibration states them
     links, dh, document          D-H and base read off the screws, and all written down: calibration
-    pose_covariance              how sure a pose is
+    pose_covariance, projection, dh_covariance   how sure a pose is, where a point is seen, and a D-H parameter
     residuals, quality, verdict, verification, paper      is it good?
     solver                       from a session to a calibration
 """

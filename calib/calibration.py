@@ -16,9 +16,11 @@ from pydantic import Field, model_validator
 from calib.chain import Chain
 from calib.corrections import Corrections, checked_sides
 from calib.dh import link_transform
+from calib.dh_covariance import DhCovariance, dh_covariance
 from calib.documents import read_json, validate, write_json
 from calib.errors import CalibError
-from calib.pose_covariance import CorrectedReadings, TwistCovariance, pose_covariances, twist_covariance
+from calib.pose_covariance import CorrectedReadings, PoseTerms, TwistCovariance, pose_terms, twist_covariance
+from calib.projection import lens_by_number, projected, projection_covariances
 from calib.session import (
     Document,
     Intrinsics,
@@ -49,6 +51,16 @@ class JointScrew(Document):
     point: Triple
 
 
+class DhStd(Document):
+    """The standard deviations of a D-H row's entries, each with all others free."""
+
+    a_prev: Number
+    alpha_prev: Number
+    d_offset: Number
+    theta_offset: Number
+    scale: Number
+
+
 class DhLink(Document):
     """A row of the modified D-H model (eq 9 to 11): lengths in metres, angles in radians."""
 
@@ -57,6 +69,7 @@ class DhLink(Document):
     d_offset: Number
     theta_offset: Number
     scale: Number
+    std: DhStd | None = None
 
 
 class CalibratedCamera(Document):
@@ -235,19 +248,57 @@ class Calibration(Document):
         known, half its play to either side is added. Raises as `world_from_camera` does.
         """
         index = self.camera_index(camera)
-        known, mount, link = self._twist_covariances[index], self._mounts[index], self._links[index]
+        known, mount = self._twist_covariances[index], self._mounts[index]
         if known is None or mount is None:
             return None
         values = self.chain.checked(readings)
-        rows, corrections = np.atleast_2d(values), self._joint_corrections
-        sides = checked_sides(approached, rows)
-        corrected = CorrectedReadings(
-            corrections.applied(rows, sides),
-            corrections.regressors(rows, sides),
-            corrections.unknown_side_std(sides),
-        )
-        covariances = pose_covariances(self.chain, mount, link, known, corrected)
+        covariances = self._pose_terms(index, mount, values, approached).covariances(known)
         return covariances if values.ndim == 2 else np.asarray(covariances[0])
+
+    def project(
+        self,
+        points: ArrayLike,
+        readings: ArrayLike,
+        camera: str | None = None,
+        approached: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """Return where `points` (p, 3) in the world (m) are seen: pixels (n, p, 2) at `readings` (n, m).
+
+        (p, 2) for one vector of readings. NaN for a point that the lens cannot see; a pixel may lie beyond the picture.
+        Raises as `world_from_camera` does, and CalibError for a camera without a lens.
+        """
+        lens = self._lens(self.camera_index(camera))
+        world = np.asarray(points, dtype=float).reshape(-1, 3)
+        return projected(world, self.world_from_camera(readings, camera, approached), lens)
+
+    def projection_covariance(
+        self,
+        points: ArrayLike,
+        readings: ArrayLike,
+        camera: str | None = None,
+        approached: ArrayLike | None = None,
+    ) -> NDArray[np.float64] | None:
+        """Return the covariances (n, p, 2, 2) of the pixels of `project` in px^2, or (p, 2, 2); None if unknown.
+
+        They tell how sure the calibration is of chain, mount and lens, and not how noisy a detector is.
+        """
+        index = self.camera_index(camera)
+        lens, known, mount = self._lens(index), self._twist_covariances[index], self._mounts[index]
+        if known is None or mount is None or self.covariance is None:
+            return None
+        values, world = self.chain.checked(readings), np.asarray(points, dtype=float).reshape(-1, 3)
+        poses = self.world_from_camera(np.atleast_2d(values), camera, approached)
+        terms = self._pose_terms(index, mount, values, approached)
+        by_number = lens_by_number(index, lens, self.covariance.parameters)
+        covariances = projection_covariances(world, poses, lens, terms, known, by_number)
+        return covariances if values.ndim == 2 else np.asarray(covariances[0])
+
+    def dh_covariance(self) -> DhCovariance | None:
+        """Return the covariance of the D-H rows and of the base; None where unknown."""
+        if self.covariance is None:
+            return None
+        base, stated = np.array(self.world_from_base), self.covariance
+        return dh_covariance(self.chain, base, stated.parameters, np.array(stated.matrix))
 
     def points_of(self, target: Target) -> NDArray[np.float64]:
         """Return where a target's points are in the world (t, 3), out of its plane where this plate's warp is known."""
@@ -267,6 +318,30 @@ class Calibration(Document):
             for joint, (low, high), reading in zip(self.joints, self.range, readings, strict=True)
             if not low <= reading <= high
         ]
+
+    def _lens(self, index: int) -> Intrinsics:
+        lens = self.cameras[index].intrinsics
+        if lens is None:
+            raise CalibError(
+                f"the lens of camera '{self.cameras[index].name}' is not known: its views carried poses, not points"
+            )
+        return lens
+
+    def _pose_terms(
+        self,
+        index: int,
+        mount: NDArray[np.float64],
+        values: NDArray[np.float64],
+        approached: ArrayLike | None,
+    ) -> PoseTerms:
+        rows, corrections = np.atleast_2d(values), self._joint_corrections
+        sides = checked_sides(approached, rows)
+        corrected = CorrectedReadings(
+            corrections.applied(rows, sides),
+            corrections.regressors(rows, sides),
+            corrections.unknown_side_std(sides),
+        )
+        return pose_terms(self.chain, mount, self._links[index], corrected)
 
     @cached_property
     def _joint_corrections(self) -> Corrections:

@@ -11,10 +11,12 @@ from calib.calibration import (
     Calibration,
     Covariance,
     DhLink,
+    DhStd,
     JointScrew,
     Quality,
 )
 from calib.chain import Chain
+from calib.dh_covariance import dh_covariance
 from calib.links import Links, based, links_of
 from calib.session import Session
 from calib.solution import Solution
@@ -48,8 +50,8 @@ def document(session: Session, method: Method, solution: Solution, quality: Qual
             for i, joint in enumerate(session.joints)
         ],
         dh=[
-            DhLink(**asdict(row), scale=float(scale))
-            for row, scale in zip(links.rows, chain.scales, strict=True)
+            DhLink(**asdict(row), scale=float(scale), std=std)
+            for row, scale, std in zip(links.rows, chain.scales, _dh_std(solution, chain, links), strict=True)
         ],
         world_from_base=links.world_from_base.tolist(),
         cameras=[_camera(session, index, solution, links) for index in range(len(session.cameras))],
@@ -69,6 +71,12 @@ def _with_conventional_points(solution: Solution) -> Chain:
         return chain
     feet = chain.points - (chain.points * chain.axes).sum(axis=1, keepdims=True) * chain.axes
     return replace(chain, points=np.where(chain.revolute[:, None], feet, solution.mounts[0, :3, 3]))
+
+
+def _dh_std(solution: Solution, chain: Chain, links: Links) -> list[DhStd | None]:
+    if solution.covariance is None:
+        return [None] * len(chain)
+    return [DhStd(**row) for row in dh_covariance(chain, links.world_from_base, *solution.covariance).std()]
 
 
 def _camera(session: Session, index: int, solution: Solution, links: Links) -> CalibratedCamera:

@@ -28,6 +28,12 @@ VECTORS = ("axis", "point")
 POSITIVE = ("scale", "fx", "fy", "aspect")
 
 
+def lens_paths(model: str) -> list[str]:
+    """Return where a lens's numbers are in a document, in the order of `LENS_NAMES`."""
+    names = LENS_NAMES[model]
+    return [*names[:4], *(f"distortion.{i}" for i in range(len(names) - 4))]
+
+
 def held_value(value: Any) -> Held | None:
     """Return `value` as a number, three numbers or None; raises ValueError for anything else."""
     if value is None:

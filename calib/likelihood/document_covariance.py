@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.likelihood.state import Layout, State, joint_basis
-from calib.parameters import LENS_NAMES
+from calib.parameters import LENS_NAMES, lens_paths
 from calib.twists import skew
 
 Array = NDArray[np.float64]
@@ -50,9 +50,7 @@ def document_jacobian(
         if model is not None:
             by_lens = np.zeros((len(LENS_NAMES[model]), count))
             by_lens[:, layout.lenses[camera]] = layout.lens_changes[camera]
-            first, bends = ["fx", "fy", "cx", "cy"], range(len(by_lens) - 4)
-            paths = first + [f"distortion.{i}" for i in bends]
-            add([f"cameras.{camera}.intrinsics.{path}" for path in paths], by_lens)
+            add([f"cameras.{camera}.intrinsics.{path}" for path in lens_paths(model)], by_lens)
     add(list(corrections), np.eye(count)[layout.corrections.start : layout.warp.stop])
     return names, np.array(rows)
 
