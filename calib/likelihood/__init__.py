@@ -7,11 +7,11 @@
     blocks               what each view says of its pose, lens and target
     problem              the likelihood: measurements, what is free, what is known beforehand
     beforehand           what is held, and what is known about
-    building             a session as that likelihood
+    building             a session as that likelihood;  idle  whether joints stand still that should
     normal               every view's information, mapped to the parameters
     descent              Levenberg and Marquardt's way down
     outliers             what does not belong
-    noise                how noisy points and poses are;  reading_noise  how noisy readings
+    noise                how noisy points and poses are;  scatter  what else scatters the views
     imperfections        what joints and target may be off by, and what knowing it would gain;  selection  what is kept
     refinement           all of it in turn, until nothing changes
     uncertainty          the covariance;  document_covariance  in the document's own numbers

@@ -80,11 +80,34 @@ def point_blocks(
 
 
 def pose_blocks(given: GivenPoses, poses: Array, weights: Array) -> Blocks:
-    """Return the blocks of views whose cameras are predicted at `poses` (n, 4, 4); `weights` (n,)."""
+    """Return the blocks of views whose cameras are predicted at `poses` (n, 4, 4); `weights` (n, 6)."""
     residuals, jacobian = pose_residuals(given.poses, poses)
-    whitened, root = residuals @ given.whitening.T, np.sqrt(weights)[:, None]
+    whitened, root = residuals @ given.whitening.T, np.sqrt(weights)
     by_twist = np.swapaxes(given.whitening @ jacobian, 1, 2)
-    return _blocks(whitened[..., None], whitened * root, by_twist * root[..., None])
+    return _blocks(whitened[..., None], whitened * root, by_twist * root[:, None])
+
+
+def loosened(blocks: Blocks, looseness: float) -> tuple[Array, Array, Array]:
+    """Return hessian, gradient and cost of views whose pose may be off at random, each at its best.
+
+    Pose errors have `looseness` times the covariance that the view's own points give its pose: then their
+    elimination takes off a fixed share of what the points say of the pose, and nothing of what they say of the lens.
+    """
+    if looseness == 0:
+        return blocks.hessian, blocks.gradient, blocks.cost
+    share = looseness / (1 + looseness)
+    by_pose = blocks.hessian[:, :6]
+    own = by_pose[:, :, :6]
+    # A view whose points were all set aside says nothing, and its zeros cannot be divided by.
+    size = np.trace(own, axis1=1, axis2=2) + 1
+    own = own + (1e-13 * size)[:, None, None] * np.eye(6)
+    gain = share * np.linalg.solve(own, np.concatenate([by_pose, blocks.gradient[:, :6, None]], axis=2))
+    transposed = np.swapaxes(by_pose, 1, 2)
+    return (
+        blocks.hessian - transposed @ gain[:, :, :-1],
+        blocks.gradient - (transposed @ gain[:, :, -1:])[..., 0],
+        blocks.cost - (blocks.gradient[:, :6] * gain[:, :, -1]).sum(axis=1),
+    )
 
 
 def pose_residuals(measured: Array, predicted: Array) -> tuple[Array, Array]:

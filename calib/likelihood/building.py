@@ -7,16 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import Chain
-from calib.closed_form import PoseViews
 from calib.lens_prior import lens_prior
 from calib.likelihood.beforehand import beforehand
+from calib.likelihood.idle import at_rest
 from calib.likelihood.lens_terms import lens_vector
 from calib.likelihood.measurements import GivenPoses, point_views
 from calib.likelihood.problem import Estimate, Group, Problem, offsets_at
 from calib.likelihood.state import Layout, State
 from calib.observations import Observation
 from calib.session import Intrinsics, Session
-from calib.sweeps import readings_at_rest, sweep_labels
 from calib.targets import disk_diameter, target_points
 
 Array = NDArray[np.float64]
@@ -64,13 +63,14 @@ def built(session: Session, observations: Sequence[Observation], start: Start) -
             views = np.array([observation.view for observation in given], dtype=np.intp)
             poses = np.array([observation.pose for observation in given])
             groups.append(Group(index, link, None, GivenPoses(views, poses, np.eye(6))))
-    readings, noisiness = _readings_and_noisiness(session)
+    readings, noisiness = at_rest(session)
     problem = Problem(
         layout=layout,
         groups=tuple(groups),
         readings=readings,
         regressors=np.zeros((*readings.shape, 0)),
         noisiness=noisiness,
+        looseness=0.0,
         reading_std=np.array([joint.reading_std or 0.0 for joint in session.joints]),
         free=known.free,
         prior=known.information,
@@ -79,16 +79,3 @@ def built(session: Session, observations: Sequence[Observation], start: Start) -
     )
     estimate = Estimate(state, np.zeros_like(readings), known.travel, offsets=())
     return problem, replace(estimate, offsets=offsets_at(problem, estimate))
-
-
-def _readings_and_noisiness(session: Session) -> tuple[Array, Array]:
-    """Return all views' readings (n, m), idle joints' averaged over their sweep, and how much noise each still has."""
-    every = PoseViews.of(session, range(len(session.views)), np.zeros((len(session.views), 4, 4)))
-    labels = sweep_labels(every.readings, every.exercised, every.cameras, every.links)
-    noisiness = np.ones_like(every.readings)
-    for joint in range(labels.shape[1]):
-        for sweep in np.unique(labels[labels[:, joint] >= 0, joint]):
-            members = labels[:, joint] == sweep
-            noisiness[members] = 1 / np.sqrt(members.sum())
-            noisiness[members, joint] = 1
-    return readings_at_rest(every.readings, labels), noisiness

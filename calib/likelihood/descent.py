@@ -84,7 +84,7 @@ def _round(problem: Problem, estimate: Estimate, weights: Weights) -> Descent:
 def count_measurements(problem: Problem, weights: Weights) -> int:
     """Return how many numbers were measured and count: two a point, six a given pose."""
     return sum(
-        (2 if isinstance(group.data, PointViews) else 6) * int((weight > 0).sum())
+        (2 if isinstance(group.data, PointViews) else 1) * int((weight > 0).sum())
         for group, weight in zip(problem.groups, weights.groups, strict=True)
     )
 

@@ -213,11 +213,11 @@ def _lenient(fit: Fit, problem: Problem, estimate: Estimate) -> Weights:
         return fit.weights
     as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
     everything = evaluate(problem, as_read, all_in(problem))
-    soft = softened(problem, misfits(problem, everything))
+    soft = softened(problem, misfits(problem, everything, all_in(problem), np.zeros_like(problem.prior)))
     groups = []
     for group, kept, little in zip(problem.groups, fit.weights.groups, soft.groups, strict=True):
         out = np.isin(group.data.views, fit.aside.views)
-        groups.append(np.where(out.reshape(-1, *[1] * (kept.ndim - 1)), little, kept))
+        groups.append(np.where(out[:, None], little, kept))
     return Weights(tuple(groups))
 
 

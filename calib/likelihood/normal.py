@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.likelihood.measurements import PointViews
-from calib.likelihood.problem import Estimate, Evaluation, Group, GroupTerms, Problem
+from calib.likelihood.problem import Estimate, Evaluation, Group, GroupTerms, Problem, said
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,8 @@ def without_reading_errors(
     problem: Problem, estimate: Estimate, group: Group, terms: GroupTerms, local: Array
 ) -> tuple[Array, Array, Elimination]:
     """Return hessian (n, d, d) and gradient (n, d) with each view's reading errors at their best (Schur)."""
-    hessian, gradient, views = terms.blocks.hessian, terms.blocks.gradient, group.data.views
+    views = group.data.views
+    hessian, gradient, _ = said(problem, group, terms.blocks)
     noisy = np.flatnonzero(problem.reading_std[: group.link] > 0)
     if not len(noisy):
         nothing = np.zeros((len(views), 0))

@@ -132,7 +132,7 @@ def information_of(
         if isinstance(group.data, GivenPoses):
             usable += len(own)
             groups.append(replace(group, data=replace(group.data, views=own, poses=poses)))
-            weights.append(np.ones(len(own)))
+            weights.append(np.ones((len(own), 6)))
             offsets.append(None)
             continue
         points = target_points(session.target)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, f
 
 from calib.likelihood.blocks import Blocks
 from calib.likelihood.measurements import PointViews
@@ -22,12 +22,14 @@ RARE = 1e-5
 TUKEY = 4.685
 FREEING_PASSES = 10
 STUDENT = 4.0
-"""Degrees of freedom of given poses' errors: other systems have longer tails than a picture's points."""
+"""Degrees of freedom of given poses' errors: other systems have longer tails than a picture's points, in rotation
+and in position each for itself."""
+KNOCKED = 3 * float(f.isf(1e-3, 3, STUDENT))
+"""How far a given pose's squared rotation or position error may be, in units of its size, for it to count at all."""
 EXACT = 0.1
 LEAST_POINT_NOISE = 1e-5
 """In px, or of what a covariance says: better is not measured, and made-up points may be exact."""
-MEDIAN_OF_TWO = float(chi2.median(2))
-MEDIAN_OF_SIX = float(chi2.median(6))
+MEDIAN = {freedom: float(chi2.median(freedom)) for freedom in (2, 3, 6)}
 
 
 @dataclass(frozen=True)
@@ -49,19 +51,19 @@ class Freed:
     information: Array
     left: Array
 
-    def distance(self, by_reading: Array, std: Array) -> Array:
-        """Return the squared distances (n,) of the shifts in terms of what their noise, and the readings', explains."""
-        spread = by_reading * std
-        covariance = np.linalg.inv(self.information) + spread @ np.swapaxes(spread, 1, 2)
+    def distance(self, scatter: Array, looseness: float) -> Array:
+        """Return the squared distances (n, 1) in units of their loosened noise and `scatter` (n, 6, 6)."""
+        covariance = (1 + looseness) * np.linalg.inv(self.information) + scatter
         reach = np.linalg.solve(covariance, self.shift[..., None])[..., 0]
-        return np.asarray((self.shift * reach).sum(axis=1))
+        return np.asarray((self.shift * reach).sum(axis=1, keepdims=True))
 
 
 @dataclass(frozen=True, eq=False)
 class Misfits:
-    """How far each group's views are from the prediction, `distances` (n,) squared, and their points' `left` (n, q).
+    """How far each group's views are from the prediction, squared, and their points' squared misfits `left` (n, q).
 
-    Both are in units of what noise makes of them: `noise` for points, `spread` for views, by their medians.
+    `distances` are (n, 1) of whole poses that points tell, (n, 2) of given poses' rotations and positions. They are in
+    units of what noise makes of them, but for `noise` (of points) and `spread` (of views), which are by their medians.
     """
 
     distances: tuple[Array, ...]
@@ -70,22 +72,51 @@ class Misfits:
     spread: float
 
 
-def misfits(problem: Problem, evaluation: Evaluation) -> Misfits:
-    """Return the misfits at an evaluation in which everything counts and readings are taken as they were read."""
-    present = all_in(problem).groups
-    freed = [
-        _freed(terms.blocks, weight) if isinstance(group.data, PointViews) else _given(terms.blocks)
-        for group, terms, weight in zip(problem.groups, evaluation.terms, present, strict=True)
-    ]
-    distances = [
-        np.nan_to_num(view.distance(terms.chain.by_reading, problem.reading_std), nan=np.inf)
-        for view, terms in zip(freed, evaluation.terms, strict=True)
-    ]
-    points = [view.left[weight > 0] for view, weight in zip(freed, present, strict=True) if view.left.size]
+def misfits(problem: Problem, evaluation: Evaluation, weights: Weights, covariance: Array) -> Misfits:
+    """Return the misfits at an evaluation in which everything counts and readings are taken as they were read.
+
+    A view that `weights` leave out is predicted by a fit that knows nothing of it: `covariance` (p, p) says how well.
+    """
+    distances, lefts, typical, typical_point = [], [], [], []
+    for group, terms, present, weight in zip(
+        problem.groups, evaluation.terms, all_in(problem).groups, weights.groups, strict=True
+    ):
+        spread = terms.chain.by_reading * problem.reading_std
+        scatter = spread @ np.swapaxes(spread, 1, 2)
+        out = ~weight.any(axis=1)
+        unseen = terms.chain.by_parameter[out]
+        scatter[out] += unseen @ covariance @ np.swapaxes(unseen, 1, 2)
+        if isinstance(group.data, PointViews):
+            view = _freed(terms.blocks, present)
+            distance, left = view.distance(scatter, problem.looseness), view.left
+            typical_point.append(left[present > 0])
+        else:
+            distance, left = given_distances(terms.blocks, scatter), np.zeros((len(weight), 0))
+        distances.append(np.nan_to_num(distance, nan=np.inf))
+        lefts.append(left)
+        typical.append(distances[-1].ravel() / MEDIAN[_freedom(distance)])
     # Whitened misfits are about 1, and far less only where the measurements are exact to rounding.
-    noise = max(float(np.nanmedian(np.concatenate(points))) / MEDIAN_OF_TWO if points else 0.0, EXACT)
-    spread = float(np.median(np.concatenate(distances))) / MEDIAN_OF_SIX
-    return Misfits(tuple(distances), tuple(view.left for view in freed), noise, max(noise, spread))
+    median = float(np.nanmedian(np.concatenate(typical_point))) / MEDIAN[2] if typical_point else 0.0
+    noise = max(median, EXACT)
+    return Misfits(
+        tuple(distances), tuple(lefts), noise, max(noise, float(np.median(np.concatenate(typical))))
+    )
+
+
+def _freedom(distances: Array) -> int:
+    """Return of how many numbers each of the distances (n, 1) or (n, 2) is made: a pose has six."""
+    return 6 // int(distances.shape[1])
+
+
+def given_distances(blocks: Blocks, scatter: Array) -> Array:
+    """Return the squared misfits (n, 2) of given poses' rotations and positions, their views scattered (n, 6, 6)."""
+    jacobian, misfit = blocks.jacobian, blocks.residuals[..., 0]
+    covariance = np.eye(6) + jacobian @ scatter @ np.swapaxes(jacobian, 1, 2)
+    parts = []
+    for part in (slice(0, 3), slice(3, 6)):
+        reach = np.linalg.solve(covariance[:, part, part], misfit[:, part, None])[..., 0]
+        parts.append((misfit[:, part] * reach).sum(axis=1))
+    return np.column_stack(parts)
 
 
 def without_bad_points(problem: Problem, found: Misfits) -> Weights:
@@ -97,8 +128,8 @@ def softened(problem: Problem, found: Misfits) -> Weights:
     """Return Cauchy's weights of whole views, and no bad points: a first idea, while the chain itself is still off."""
     groups = []
     for weight, distance in zip(without_bad_points(problem, found).groups, found.distances, strict=True):
-        soft = 1 / (1 + distance / (6 * found.spread))
-        groups.append(weight * soft.reshape(-1, *[1] * (weight.ndim - 1)))
+        soft = 1 / (1 + distance / (_freedom(distance) * found.spread))
+        groups.append(weight * np.repeat(soft, weight.shape[1] // soft.shape[1], axis=1))
     return Weights(tuple(groups))
 
 
@@ -110,11 +141,13 @@ def judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
     for group, base, left, distance in zip(
         problem.groups, all_in(problem).groups, found.left, found.distances, strict=True
     ):
+        farthest = chi2.isf(RARE, 6) if isinstance(group.data, PointViews) else KNOCKED
         # A view that the prediction puts behind the camera has no distance at all.
-        out = ~(distance <= chi2.isf(RARE, 6) * found.spread)
+        out = np.any(~(distance <= farthest * found.spread), axis=1)
         knocked += group.data.views[out].tolist()
         if not isinstance(group.data, PointViews):
-            groups.append(np.where(out, 0.0, base * (STUDENT + 6) / (STUDENT + distance)))
+            tails = (STUDENT + 3) / (STUDENT + distance)
+            groups.append(np.where(out[:, None], 0.0, base * np.repeat(tails, 3, axis=1)))
             continue
         wrong = ~(left <= chi2.isf(RARE, 2) * found.noise) & (base > 0)
         rows, columns = np.nonzero(wrong & ~out[:, None])
@@ -129,7 +162,7 @@ def point_noise(blocks: Blocks, present: Array) -> float:
     Bad points are left out, so that what remains is a truncated noise: the few good ones lost do not matter.
     """
     left = _freed(blocks, present).left
-    first = float(np.nanmedian(left[present > 0])) / MEDIAN_OF_TWO
+    first = float(np.nanmedian(left[present > 0])) / MEDIAN[2]
     good = (present > 0) & (left < chi2.isf(RARE, 2) * first)
     freedom = 2 * good.sum() - 6 * len(left)
     return max(float(np.sqrt(left[good].sum() / max(freedom, 1))), LEAST_POINT_NOISE)
@@ -145,7 +178,7 @@ def _freed(blocks: Blocks, present: Array) -> Freed:
         shift = -np.linalg.solve(weighted @ flat, weighted @ right)
         square = _squares(right + flat @ shift)
         typical = np.maximum(_median(square, present), 1e-24)
-        reach = TUKEY**2 / MEDIAN_OF_TWO * typical[:, None]
+        reach = TUKEY**2 / MEDIAN[2] * typical[:, None]
         weight = present * np.maximum(1 - square / reach, 0) ** 2
     kept = np.repeat(weight > 0, 2, axis=1)[:, None]
     return Freed(np.asarray(shift[..., 0], float), (transposed * kept) @ flat, square)
@@ -161,9 +194,3 @@ def _median(values: Array, present: Array) -> Array:
     ordered = np.sort(np.where(present > 0, values, np.inf), axis=1)
     middle = np.maximum(present.sum(axis=1).astype(int) - 1, 0) // 2
     return np.asarray(ordered[np.arange(len(ordered)), middle])
-
-
-def _given(blocks: Blocks) -> Freed:
-    """Return given poses as they are: the view has nothing beside them that could be bad."""
-    shift = -np.linalg.solve(blocks.hessian[:, :6, :6], blocks.gradient[:, :6, None])[..., 0]
-    return Freed(np.asarray(shift, float), blocks.hessian[:, :6, :6], np.zeros((0,)))

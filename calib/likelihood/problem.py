@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.likelihood.blocks import Blocks, disk_offsets, point_blocks, pose_blocks
+from calib.likelihood.blocks import Blocks, disk_offsets, loosened, point_blocks, pose_blocks
 from calib.likelihood.chain_terms import ChainTerms, chain_terms
 from calib.likelihood.lens_terms import lens_from_vector
 from calib.likelihood.measurements import GivenPoses, PointViews
@@ -31,8 +31,9 @@ class Problem:
 
     `readings` (n, m) are those of all the session's views, `regressors` (n, m, k) say how much of each correction
     is added to them, `reading_std` (m,) how noisy they are, and `noisiness` (n, m) how much of that noise each
-    has: the mean of an idle joint's readings over a sweep has less. `free` (p,) are the parameters that may move,
-    `prior` (p, p) the information that says how far from the start. `bulges` (t, w) are the shapes of the
+    has: the mean of an idle joint's readings over a sweep has less. `looseness` says how many times the covariance
+    that its points give a view's pose its distance from the chain has beyond that. `free` (p,) are the parameters that
+    may move, `prior` (p, p) the information that says how far from the start. `bulges` (t, w) are the shapes of the
     target's warp at its points.
     """
 
@@ -42,6 +43,7 @@ class Problem:
     regressors: Array
     reading_std: Array
     noisiness: Array
+    looseness: float
     free: NDArray[np.bool_]
     prior: Array
     disk_diameter: float | None
@@ -64,7 +66,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """The weight of each measurement of a group: points (n, q) or poses (n,), 0 for what is set aside."""
+    """The weight of each measurement of a group: points (n, q) or poses (n, 6), 0 for what is set aside."""
 
     groups: tuple[Array, ...]
 
@@ -89,7 +91,7 @@ def all_in(problem: Problem) -> Weights:
     """Return weights with which everything counts."""
     return Weights(
         tuple(
-            group.data.present if isinstance(group.data, PointViews) else np.ones(len(group.data.views))
+            group.data.present if isinstance(group.data, PointViews) else np.ones((len(group.data.views), 6))
             for group in problem.groups
         )
     )
@@ -135,11 +137,19 @@ def evaluate(problem: Problem, estimate: Estimate, weights: Weights) -> Evaluati
         else:
             blocks = pose_blocks(group.data, chain.poses, weight)
         terms.append(GroupTerms(chain, blocks))
-        cost += float(blocks.cost.sum())
+        cost += float(said(problem, group, blocks)[2].sum())
     noisy = problem.reading_std > 0
     cost += float(((estimate.reading_errors[:, noisy] / problem.reading_std[noisy]) ** 2).sum())
     cost += float(estimate.travel @ problem.prior @ estimate.travel)
     return Evaluation(tuple(terms), cost if np.isfinite(cost) else np.inf)
+
+
+def said(problem: Problem, group: Group, blocks: Blocks) -> tuple[Array, Array, Array]:
+    """Return hessian, gradient and cost of the group's views, as loosely as points tell of the chain.
+
+    Given poses have in their own noise whatever scatters them.
+    """
+    return loosened(blocks, problem.looseness if isinstance(group.data, PointViews) else 0.0)
 
 
 def _chain_terms(problem: Problem, group: Group, estimate: Estimate) -> ChainTerms:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from calib.likelihood.building import Start, built
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
+from calib.likelihood.idle import as_the_views_follow
 from calib.likelihood.imperfections import Fit, Imperfections
 from calib.likelihood.lens_terms import lens_from_vector
 from calib.likelihood.noise import seen_noise
@@ -78,7 +79,7 @@ def refine(
     unknown = np.array([joint.reading_std is None for joint in session.joints], dtype=bool)
 
     def refit(problem: Problem, estimate: Estimate) -> Fit:
-        return _settled(problem, estimate, unknown)
+        return _settled(problem, estimate, session.readings(), unknown)
 
     found = selected(session, refit(*built(session, observations, start)), refit, target_warp)
     problem, weights, aside, descent = (
@@ -104,16 +105,18 @@ def refine(
     )
 
 
-def _settled(problem: Problem, estimate: Estimate, unknown: NDArray[np.bool_]) -> Fit:
+def _settled(problem: Problem, estimate: Estimate, as_read: Array, unknown: NDArray[np.bool_]) -> Fit:
     """Return the fit from an estimate when neither noise nor outliers change any more.
 
-    `unknown` (m,) tells the joints whose readings' noise nobody said.
+    `as_read` (n, m) are the readings, also of joints that should stand still; `unknown` (m,) tells the joints whose
+    readings' noise nobody said.
     """
     problem, estimate, weights, aside = _approached(problem, estimate)
+    problem = as_the_views_follow(problem, evaluate(problem, estimate, weights), as_read)
     for _ in range(MOST_PASSES):
         descent = descend(problem, estimate, weights)
-        estimate = descent.estimate
-        problem, found, settled = seen_noise(problem, estimate, weights, unknown)
+        estimate, known = descent.estimate, step_covariance(problem, descent, 1.0)
+        problem, found, settled = seen_noise(problem, estimate, weights, known, unknown)
         weights, newly = judged(problem, found)
         if settled and newly == aside:
             break
@@ -128,17 +131,17 @@ def _approached(problem: Problem, estimate: Estimate) -> tuple[Problem, Estimate
     is. If so, all count a little, from the start again, until the chain is about right. Far from it every misfit would
     pass for noise of readings: that is asked later.
     """
-    none = np.zeros(len(problem.reading_std), dtype=bool)
-    problem, found, _ = seen_noise(problem, estimate, all_in(problem), none)
+    unasked = np.zeros_like(problem.prior)
+    problem, found, _ = seen_noise(problem, estimate, all_in(problem), unasked)
     weights, aside = judged(problem, found)
     if not aside.views:
         return problem, estimate, weights, aside
     plain = descend(problem, estimate, without_bad_points(problem, found)).estimate
-    rescaled, found_there, _ = seen_noise(problem, plain, weights, none)
+    rescaled, found_there, _ = seen_noise(problem, plain, weights, unasked)
     weights, aside = judged(rescaled, found_there)
     if not aside.views:
         return rescaled, plain, weights, aside
     for _ in range(SOFT_PASSES):
         estimate = descend(problem, estimate, softened(problem, found)).estimate
-        problem, found, _ = seen_noise(problem, estimate, weights, none)
+        problem, found, _ = seen_noise(problem, estimate, weights, unasked)
     return problem, estimate, *judged(problem, found)

@@ -3,9 +3,8 @@
 A correction of k coefficients is kept when it gains more in twice the log-likelihood than the extended BIC asks for:
 k log n, and 2 log c for having been chosen among c. Likelihoods are compared with
 
-    readings as noisy as each fit sees them: an error that is explained is no longer noise;
-    a view that does not belong costing as much as one that just does, so that setting it aside gains nothing;
-    gains over the spread that remains where the chain is never as good as its pictures.
+    views as scattered as each fit sees them: an error that is explained is no longer noise;
+    a view that does not belong costing as much as one that just does, so that setting it aside gains nothing.
 """
 
 from collections.abc import Callable
@@ -26,7 +25,7 @@ from calib.likelihood.imperfections import (
     worths,
 )
 from calib.likelihood.measurements import PointViews
-from calib.likelihood.outliers import MEDIAN_OF_SIX, RARE, STUDENT
+from calib.likelihood.outliers import RARE, STUDENT, given_distances
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
 from calib.session import Session
 
@@ -65,7 +64,7 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
         for candidate in _promising(candidates, price, noisy=bool((fit.problem.reading_std != given).any())):
             wanted = candidate.imperfections
             problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, about, has, wanted)
-            trial = refit(replace(problem, reading_std=given), _as_read(estimate))
+            trial = refit(replace(problem, reading_std=given, looseness=0.0), _as_read(estimate))
             worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
             if min([gained(fit, trial), *worth]) <= price(candidate):
                 continue
@@ -103,13 +102,12 @@ def _as_read(estimate: Estimate) -> Estimate:
 
 
 def gained(before: Fit, after: Fit) -> float:
-    """Return what `after` gains over `before` in twice the log-likelihood, in units of the spread that it leaves."""
+    """Return what `after` gains over `before` in twice the log-likelihood."""
     # Both in the same units of noise: those of before, which count no more than they should.
     groups = before.problem.groups
     weights = _without_bad_points(after)
-    old, _ = _deviance(before.problem, before, weights)
-    new, spread = _deviance(replace(after.problem, groups=groups), after, weights)
-    return (old - new) / spread
+    old = _deviance(before.problem, before, weights)
+    return old - _deviance(replace(after.problem, groups=groups), after, weights)
 
 
 def _without_bad_points(fit: Fit) -> Weights:
@@ -126,28 +124,25 @@ def _without_bad_points(fit: Fit) -> Weights:
     return Weights(tuple(groups))
 
 
-def _deviance(problem: Problem, fit: Fit, weights: Weights) -> tuple[float, float]:
-    """Return minus twice the log-likelihood with the reading errors integrated out, and how far views spread.
-
-    The spread is the median squared distance of views over what it is for noise alone, and at least 1.
-    """
+def _deviance(problem: Problem, fit: Fit, weights: Weights) -> float:
+    """Return minus twice the log-likelihood, what scatters the views integrated out."""
     estimate = fit.descent.estimate
-    as_read = _as_read(estimate)
-    there = evaluate(problem, as_read, weights)
-    total, distances = float(estimate.travel @ problem.prior @ estimate.travel), []
+    there = evaluate(problem, _as_read(estimate), weights)
+    total = float(estimate.travel @ problem.prior @ estimate.travel)
     for group, terms in zip(problem.groups, there.terms, strict=True):
-        hessian, gradient = terms.blocks.hessian[:, :6, :6], terms.blocks.gradient[:, :6]
+        points = isinstance(group.data, PointViews)
+        loose = 1 + problem.looseness if points else 1.0
+        hessian, gradient = terms.blocks.hessian[:, :6, :6] / loose, terms.blocks.gradient[:, :6] / loose
         away = (gradient * np.linalg.solve(hessian, gradient[..., None])[..., 0]).sum(axis=1)
         spread = terms.chain.by_reading * problem.reading_std
         transposed = np.swapaxes(spread, 1, 2)
         noise = transposed @ hessian @ spread + np.eye(spread.shape[2])
-        pull = (transposed @ gradient[..., None])[..., 0]
-        distance = away - (pull * np.linalg.solve(noise, pull[..., None])[..., 0]).sum(axis=1)
-        freed = terms.blocks.cost - away
-        if isinstance(group.data, PointViews):
-            cost = np.minimum(distance, BELONGS)
+        if points:
+            pull = (transposed @ gradient[..., None])[..., 0]
+            distance = away - (pull * np.linalg.solve(noise, pull[..., None])[..., 0]).sum(axis=1)
+            cost = terms.blocks.cost - loose * away + np.minimum(distance, BELONGS) + 6 * np.log(loose)
         else:
-            cost = (STUDENT + 6) * np.log1p(distance / STUDENT)
-        total += float((freed + cost + np.linalg.slogdet(noise)[1]).sum())
-        distances.append(distance)
-    return total, max(1.0, float(np.median(np.concatenate(distances))) / MEDIAN_OF_SIX)
+            parts = given_distances(terms.blocks, spread @ transposed)
+            cost = ((STUDENT + 3) * np.log1p(parts / STUDENT)).sum(axis=1)
+        total += float((cost + np.linalg.slogdet(noise)[1]).sum())
+    return total
