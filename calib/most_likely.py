@@ -48,7 +48,7 @@ def most_likely(
         left_out=(aside.views, aside.points),
         held_out=refined.held_out,
         noise_px=_point_noise(refined.problem),
-        weaknesses=weaknesses(session, refined.problem, refined.weights, refined.descent, refined.noise**2),
+        weaknesses=weaknesses(session, refined),
         corrections=Corrections(found.models, state.corrections),
         warp=dict(zip(found.warp, state.warp.tolist(), strict=True)),
     )
@@ -59,8 +59,9 @@ def _point_noise(problem: Problem) -> float | None:
     squares, count = 0.0, 0.0
     for group in problem.groups:
         if isinstance(group.data, PointViews):
-            # The covariance of a point is that of W^-1 times unit noise.
-            spread = (np.linalg.inv(group.data.whitening) ** 2).sum(axis=(2, 3))
+            # A point's noise is W^-1 times unit noise, and a 2 x 2 inverse is as large as W over its determinant.
+            whitening = group.data.whitening
+            spread = (whitening**2).sum(axis=(2, 3)) / np.linalg.det(whitening) ** 2
             squares += float((spread * group.data.present).sum())
             count += float(group.data.present.sum())
     return sqrt(squares / count) if count else None

@@ -1,6 +1,6 @@
 """How well a calibration explains the views that it was made from, and those held out."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import Literal
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calib.calibration import Calibration, JointQuality, MeanAndMax, Quality, ViewQuality
 from calib.observations import Observation
-from calib.residuals import ViewResidual, root_mean_square, view_residuals
+from calib.residuals import ViewResidual, view_residuals
 from calib.session import Session
 from calib.solution import Solution
 from calib.verdict import judgement_and_verdict
@@ -28,10 +28,11 @@ class Miss:
     rotation: float | None
 
     @classmethod
-    def of(cls, residual: ViewResidual, bad: Collection[tuple[int, int]] = ()) -> "Miss":
-        """Return the miss of one view, points that are `bad` (view, id) not counted."""
-        good = np.array([(residual.view, point) not in bad for point in residual.ids.tolist()], dtype=bool)
-        errors = residual.errors[good]
+    def of(cls, residual: ViewResidual, bad: Sequence[int] = ()) -> "Miss":
+        """Return the miss of one view, points with the ids `bad` not counted."""
+        errors = residual.errors
+        if bad:
+            errors = errors[~np.isin(residual.ids, bad)]
         pixels = float(np.sqrt((errors**2).mean())) if len(errors) else None
         return cls(len(errors), pixels, residual.position, residual.rotation)
 
@@ -62,10 +63,20 @@ def judged(
     counts nowhere but in its own view.
     """
     residuals = view_residuals(calibration, session, observations)
-    aside, bad = set(solution.left_out[0]), set(solution.left_out[1])
+    aside = set(solution.left_out[0])
+    bad: dict[int, list[int]] = {}
+    for view, point in solution.left_out[1]:
+        bad.setdefault(view, []).append(point)
     uses = {residual.view: session.views[residual.view].use for residual in residuals}
-    fitted = {r.view: Miss.of(r, bad) for r in residuals if uses[r.view] == "fit" and r.view not in aside}
-    verify = {r.view: Miss.of(r) for r in residuals if uses[r.view] == "verify"}
+    misses = {residual.view: Miss.of(residual) for residual in residuals}
+    fitted = {
+        residual.view: Miss.of(residual, bad[residual.view])
+        if residual.view in bad
+        else misses[residual.view]
+        for residual in residuals
+        if uses[residual.view] == "fit" and residual.view not in aside
+    }
+    verify = {view: miss for view, miss in misses.items() if uses[view] == "verify"}
     by_others = {
         error.view: Miss(fitted[error.view].points, error.rms_px, error.position_m, error.rotation_rad)
         for error in solution.held_out
@@ -80,7 +91,7 @@ def judged(
                 view=residual.view,
                 joint=session.views[residual.view].joint,
                 use=uses[residual.view],
-                rms_px=root_mean_square([residual]),
+                rms_px=misses[residual.view].pixels,
                 position_m=residual.position,
                 rotation_rad=residual.rotation,
                 held_out_px=alone and alone.pixels,

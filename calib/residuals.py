@@ -175,9 +175,3 @@ def _projected(world: Array, poses: Array, lens: Intrinsics) -> Array:
     camera_from_world = inverse(poses)
     points = world @ np.swapaxes(camera_from_world[:, :3, :3], 1, 2) + camera_from_world[:, None, :3, 3]
     return project_points(points, lens)
-
-
-def root_mean_square(residuals: Sequence[ViewResidual]) -> float | None:
-    """Return the rms over the points of these views in px, None where they have none."""
-    errors = np.concatenate([residual.errors for residual in residuals]) if residuals else np.zeros(0)
-    return float(np.sqrt((errors**2).mean())) if len(errors) else None

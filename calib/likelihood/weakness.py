@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from calib.likelihood.descent import Descent
 from calib.likelihood.other_views import Change, information_of, other_views
-from calib.likelihood.problem import Problem, Weights
+from calib.likelihood.problem import Problem
 from calib.likelihood.quantities import Quantity, quantities
+from calib.likelihood.refinement import Refined
+from calib.likelihood.state import State
 from calib.likelihood.uncertainty import covariance_of
 from calib.likelihood.usual import usual_rig
 from calib.session import Session
@@ -64,20 +66,16 @@ class Weakness:
         return self.known[0].std >= NOT_AT_ALL
 
 
-def weaknesses(
-    session: Session, problem: Problem, weights: Weights, descent: Descent, variance: float
-) -> list[Weakness]:
-    """Return what the fit leaves in the dark, the worst first; `variance` is that of a whitened measurement."""
-    groups = _hiding_each_other(
-        _asked(session, problem, descent),
-        covariance_of(problem, descent.equations.information, variance),
-    )
+def weaknesses(session: Session, fit: Refined) -> list[Weakness]:
+    """Return what a fit leaves in the dark, the worst first, and what would help most against each."""
+    problem, variance = fit.problem, fit.noise**2
+    groups = _hiding_each_other(_asked(session, problem, fit.state), fit.covariance)
     if not groups:
         return []
-    usual = usual_rig(problem, descent, weights)
+    usual = usual_rig(problem, fit.descent, fit.weights)
     present = covariance_of(problem, usual.equations.information, variance)
     offered = _offered(session, problem, usual, variance)
-    there = {(one.kind, one.owner): one for one in _asked(session, problem, usual)}
+    there = {(one.kind, one.owner): one for one in _asked(session, problem, usual.estimate.state)}
     found = []
     for group in groups:
         same = [there[one.quantity.kind, one.quantity.owner] for one in group]
@@ -85,11 +83,11 @@ def weaknesses(
     return found
 
 
-def _asked(session: Session, problem: Problem, descent: Descent) -> list[Quantity]:
+def _asked(session: Session, problem: Problem, state: State) -> list[Quantity]:
     points = target_points(session.target)
     return quantities(
         problem,
-        descent.estimate.state,
+        state,
         [joint.name for joint in session.joints],
         [camera.name for camera in session.cameras],
         points.mean(axis=0) if len(points) else np.zeros(3),
@@ -98,6 +96,12 @@ def _asked(session: Session, problem: Problem, descent: Descent) -> list[Quantit
 
 def _hiding_each_other(asked: Sequence[Quantity], covariance: Array) -> list[list[Known]]:
     """Return the quantities that matter in groups, each with those that it can't be told apart from."""
+    # No direction is known worse than all of a quantity's numbers together: most fits are done here.
+    rows = np.concatenate([quantity.rows for quantity in asked])
+    variances = np.einsum("kp,kp->k", rows @ covariance, rows)
+    starts = np.cumsum([0, *(len(quantity.rows) for quantity in asked[:-1])])
+    if np.add.reduceat(variances, starts).max(initial=0) < 1:
+        return []
     known = [Known(quantity, quantity.std(covariance)) for quantity in asked]
     suspects = sorted((one for one in known if one.std >= ACCOMPLICE), key=lambda one: -one.std)
     if not suspects or suspects[0].std < 1:

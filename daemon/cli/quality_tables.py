@@ -32,7 +32,7 @@ def print_quality(quality: Quality) -> None:
 
 def joint_table(joints: Sequence[JointQuality]) -> Table:
     """Return a row for each joint: what the fit leaves of its views, and how they are predicted without being known."""
-    table = Table(title="The views, by the joint that moved", title_justify="left")
+    table = Table(title="Views by joint", title_justify="left")
     table.add_column("joint")
     table.add_column("views", justify="right")
     columns = _add_columns(table, joints)
@@ -53,7 +53,7 @@ def worst_views(views: Sequence[ViewQuality]) -> list[ViewQuality]:
 
 def view_table(views: Sequence[ViewQuality]) -> Table:
     """Return a row for each view."""
-    table = Table(title="The views that agree worst", title_justify="left")
+    table = Table(title="The worst views", title_justify="left")
     table.add_column("view", justify="right")
     for heading in ("joint", "use"):
         table.add_column(heading)

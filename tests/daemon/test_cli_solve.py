@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from daemon.cli.main import main
@@ -57,3 +58,28 @@ def test_what_cannot_be_held_is_a_wrong_call(
         main(["solve", str(session), "--hold", hold])
     assert ended.value.code == 2
     assert says in capsys.readouterr().err
+
+
+def test_it_ends_with_the_verdict_after_tables_by_joint_and_by_view(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads(session.read_text())
+    rng = np.random.default_rng(0)
+    for view in document["views"]:
+        pixels = np.array(view["points"]["pixels"])
+        view["points"]["pixels"] = (pixels + 0.01 * rng.normal(size=pixels.shape)).tolist()
+    session.write_text(json.dumps(document))
+    with pytest.raises(SystemExit) as ended:
+        main(["solve", str(session), "-o", str(session.with_name("c.json"))])
+    assert ended.value.code == 0
+    printed = capsys.readouterr().out
+    quality = json.loads(session.with_name("c.json").read_text())["quality"]
+    assert quality["verdict"] in printed
+    by_joint, by_view = printed.split("Views by joint")[1].split("The worst views")
+    for row in quality["joints"]:
+        cells = next(line for line in by_joint.splitlines() if row["joint"] in line).split("│")
+        assert cells[2].strip() == str(row["views"])
+        assert cells[4].strip() == f"{row['held_out_px']:.3f}"
+    worst = max(quality["views"], key=lambda view: view["held_out_px"])
+    first = next(line for line in by_view.splitlines() if line.startswith("│"))
+    assert first.split("│")[1].strip() == str(worst["view"])

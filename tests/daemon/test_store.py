@@ -44,6 +44,26 @@ async def test_what_is_stored_is_there_after_a_restart(tmp_path: Path) -> None:
     await store.close()
 
 
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ('{"quality": {"judgement": "good", "verdict": "Good: all of it"}}', ("good", "Good: all of it")),
+        ('{"quality": {"rms_px": 0.1}}', (None, None)),
+        ('{"quality": {"judgement": "go', (None, None)),
+    ],
+)
+async def test_the_list_says_what_each_calibration_is_worth(
+    tmp_path: Path, document: str, said: tuple[str | None, str | None]
+) -> None:
+    store = await Store.open(tmp_path)
+    await store.add_run(RUN)
+    kept = replace(calibration("a"), document=document)
+    await store.change_run(RUN.id, RunState.SUCCEEDED, calibration=kept)
+    entries = await store.calibrations()
+    assert [(entry.judgement, entry.verdict) for entry in entries] == [said]
+    await store.close()
+
+
 async def test_one_calibration_is_active(tmp_path: Path) -> None:
     store = await Store.open(tmp_path)
     for name in ("a", "b"):

@@ -1,5 +1,6 @@
 """What the views do not tell is named, nothing else is, and the advice that is given helps as much as it says."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,9 +10,11 @@ from benchmarks.random_rigs import looking_rig, noisy_session
 from calib import solve
 from calib.first_solution import camera_views, first_solution
 from calib.likelihood.building import Start, built
+from calib.likelihood.other_views import Sweep, Tilt, information_of, other_views
 from calib.likelihood.quantities import Quantity, quantities
 from calib.likelihood.refinement import Refined, refine
 from calib.likelihood.state import State
+from calib.likelihood.usual import usual_rig
 from calib.likelihood.weakness import Weakness, weaknesses
 from calib.most_likely import most_likely
 from calib.observations import observe
@@ -41,10 +44,6 @@ def refined(session: Session) -> Refined:
     return refine(session, observations, Start(start.chain, start.mounts, start.lenses))
 
 
-def weak(session: Session, fit: Refined) -> list[Weakness]:
-    return weaknesses(session, fit.problem, fit.weights, fit.descent, fit.noise**2)
-
-
 def asked(session: Session, fit: Refined) -> dict[tuple[str, str], Quantity]:
     names = [joint.name for joint in session.joints]
     found = quantities(fit.problem, fit.state, names, ["main"], CENTRE)
@@ -55,7 +54,7 @@ def asked(session: Session, fit: Refined) -> dict[tuple[str, str], Quantity]:
 def weak_fit(name: str) -> tuple[Session, Refined, list[Weakness]]:
     session = seen(WEAK[name], WEAK[name].plan(), seed=0)
     fit = refined(session)
-    return session, fit, weak(session, fit)
+    return session, fit, weaknesses(session, fit)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -121,7 +120,7 @@ def _axis(state: State, joint: int, amid: np.ndarray) -> tuple[np.ndarray, np.nd
 def test_nothing_is_said_of_a_rig_that_is_looked_at_well(seed: int) -> None:
     rng = np.random.default_rng(seed)
     session = noisy_session(looking_rig(rng, 2 + seed % 3), rng)
-    assert weak(session, refined(session)) == []
+    assert weaknesses(session, refined(session)) == []
 
 
 def test_a_slide_along_the_line_of_sight_hides_the_focal_length() -> None:
@@ -182,3 +181,38 @@ def test_most_likely_tells_what_is_weak() -> None:
     sentences = solve(session).quality.warnings
     assert len(sentences) == len(found)
     assert "times better known" in sentences[0]
+
+
+def test_nothing_is_advised_that_the_camera_could_not_see() -> None:
+    """A plate is not leaned beyond what is found, nor the camera turned away from it."""
+    looking = pan_and_tilt(40, 2, 2)
+    session = seen(looking, looking.plan(), seed=0)
+    fit = refined(session)
+    offered = {
+        others.change: information_of(others, session, fit.problem, fit.descent.estimate)
+        for others in other_views(session, fit.problem, fit.state)
+    }
+    leaning = {
+        change.degrees for change, told in offered.items() if isinstance(change, Tilt) and told is not None
+    }
+    about_y = [change for change in offered if isinstance(change, Tilt) and change.axis == "Y"]
+    assert leaning
+    assert [offered[change] is None for change in about_y].count(True) == 1
+    wide = Sweep("j0", -4.0, 4.0)
+    assert offered[wide] is not None
+    far = next(o for o in other_views(session, fit.problem, fit.state) if o.change == wide)
+    behind = replace(far, readings=far.readings + np.array([180.0, 0.0]))
+    assert information_of(behind, session, fit.problem, fit.descent.estimate) is None
+
+
+def test_a_lens_that_the_views_tell_stays_as_they_have_it() -> None:
+    """What is usual weighs less than a tenth of a standard deviation where the views tell better."""
+    rng = np.random.default_rng(4)
+    session = noisy_session(looking_rig(rng, 3), rng)
+    fit = refined(session)
+    usual = usual_rig(fit.problem, fit.descent, fit.weights).estimate.state.lenses[0]
+    found, part = fit.state.lenses[0], fit.problem.layout.lenses[0]
+    assert usual is not None
+    assert found is not None
+    std = np.sqrt(np.diag(fit.covariance)[part])
+    assert np.all(np.abs(usual - found)[:4] < 0.1 * std[:4])
