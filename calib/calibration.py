@@ -303,7 +303,11 @@ class Calibration(Document):
     def points_of(self, target: Target) -> NDArray[np.float64]:
         """Return where a target's points are in the world (t, 3), out of its plane where this plate's warp is known."""
         points, warp = target_points(target), self.corrections.target_warp
-        if warp is not None and target == self.target:
+        if (
+            warp is not None
+            and self.target is not None
+            and np.array_equal(points, target_points(self.target))
+        ):
             points[:, 2] += warp.bulge(points)
         return points
 

@@ -39,6 +39,7 @@ def most_likely(
         session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior), target_warp
     )
     state, aside, found = refined.state, refined.set_aside, refined.imperfections
+    unused = refined.unused_warp
     return replace(
         start,
         chain=state.chain,
@@ -51,6 +52,9 @@ def most_likely(
         weaknesses=weaknesses(session, refined),
         corrections=Corrections(found.models, state.corrections),
         warp=dict(zip(found.warp, state.warp.tolist(), strict=True)),
+        unused_warp={}
+        if unused is None
+        else dict(zip(unused.imperfections.warp, unused.values, strict=True)),
     )
 
 

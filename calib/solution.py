@@ -23,8 +23,9 @@ class Solution:
     their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
     well each view is predicted by the fit of all others, `weaknesses` what the views leave in the dark, `noise_px`
     how much single points scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
-    (4, 4) its base. `corrections` are what imperfect joints add to their readings, and `warp` the height (m) of each
-    shape of the target's.
+    (4, 4) its base. `corrections` are what imperfect joints add to their readings, `warp` the height (m) of each
+    shape of the target's, and `unused_warp` about what that would be where the data support one that nobody asked
+    for.
     """
 
     chain: Chain
@@ -40,3 +41,4 @@ class Solution:
     world_from_base: Array | None = None
     corrections: Corrections = NO_CORRECTIONS
     warp: dict[str, float] = field(default_factory=dict)
+    unused_warp: dict[str, float] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from calib.parameters import Held
 from calib.quality import judged
 from calib.session import Session
 from calib.solution import Solution
-from calib.stated_corrections import corrections_in_words
+from calib.stated_corrections import FLAT, corrections_in_words, unused_warp_in_words
 from calib.targets import target_points
 from calib.unfinished import finished_part
 
@@ -25,6 +25,7 @@ def solve(
     method: Method = "ml",
     progress: Progress | None = None,
     hold: Mapping[str, Held | None] | None = None,
+    target_warp: bool = False,
 ) -> Calibration:
     """Calibrate the active camera of `session`: chain, camera on it, base and lens, with no initial guess.
 
@@ -32,8 +33,9 @@ def solve(
     `progress` is told what is being done. Views marked `verify` are held out; they only enter the quality. A
     session that was cut off (`complete` is false) is solved as far as it goes, for the joints that were
     exercised. `hold` are parameters to be kept at a value, by name, beside those that the session holds
-    (`calib.parameters`). Raises FormatError for one that there is not, UnsolvableError, which names the joint or
-    view and what would help, and ImageError for a missing picture.
+    (`calib.parameters`). With `target_warp` the fit lets the target bulge, if the data support it. Raises
+    FormatError for a parameter that there is not, UnsolvableError, which names the joint or view and what
+    would help, and ImageError for a missing picture.
     """
     session, cut_off = finished_part(session.holding(hold or {}))
     observed = observe(session, progress)
@@ -48,17 +50,21 @@ def solve(
     solution = _start(session, fit, seen, method)
     fitted = method == "ml" and bool(session.joints)
     if fitted:
-        solution = most_likely(session, fit, solution)
+        solution = most_likely(session, fit, solution, target_warp)
     warnings = [] if cut_off is None else [cut_off]
     units = {joint.name: joint.reading_unit for joint in session.joints}
     warnings += [weakness_in_words(weakness, units) for weakness in solution.weaknesses]
     for camera, std in zip(session.cameras, seen.focal_std, strict=True):
         if std is None or not fitted:
             warnings += lens_in_words(camera.name, std)
-    warnings += [*left_out_in_words(solution), *observed.missing]
+    points = target_points(session.target)
+    warnings += [*left_out_in_words(solution), *unused_warp_in_words(solution.unused_warp, points)]
+    warnings += observed.missing
     calibration = document(session, method, solution, Quality())
     quality = judged(calibration, session, observed.observations, solution, warnings)
-    corrected = corrections_in_words(calibration.corrections, session.joints, target_points(session.target))
+    corrected = corrections_in_words(calibration.corrections, session.joints, points)
+    if target_warp and not solution.warp:
+        corrected.append(FLAT)
     quality = quality.model_copy(update={"corrections": corrected})
     return calibration.model_copy(update={"quality": quality})
 

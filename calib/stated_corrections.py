@@ -11,7 +11,7 @@ from calib.corrections import Backlash, Corrections, Coupling, OncePerTurn
 from calib.session import Document, Joint, Number, Positive
 from calib.warp import warp_shapes
 
-Shape = Annotated[str, Field(pattern="^(xx|xy|yy|xxx|xxy|xyy|yyy)$")]
+Shape = Annotated[str, Field(pattern="^x*y*$", min_length=2, max_length=4)]
 
 
 class StatedBacklash(Document):
@@ -168,6 +168,21 @@ def corrections_in_words(
         deviation = 1e3 * max(stated.target_warp.heights_std or [0.0])
         sentences.append(f"the target is {_size(bulge, deviation, 'mm')} from flat, taken into account")
     return sentences
+
+
+FLAT = "the target's warp: the data do not tell it from a flat one, and it is taken for flat"
+
+
+def unused_warp_in_words(warp: Mapping[str, float], points: NDArray[np.float64]) -> list[str]:
+    """Return a sentence where a warp, by the height (m) of each shape, would explain much and was not asked for."""
+    if not warp:
+        return []
+    seems = TargetWarp(shapes=list(warp), heights=list(warp.values()))
+    bulge = 1e3 * float(np.ptp(seems.bulge(points)))
+    return [
+        f"the target seems to be {bulge:.2g} mm from flat: "
+        "mount it on something flat, or solve again with --target-warp"
+    ]
 
 
 def _size(value: float, deviation: float, unit: str) -> str:

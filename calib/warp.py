@@ -7,8 +7,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-QUADRATIC = ("xx", "xy", "yy")
-CUBIC = ("xxx", "xxy", "xyy", "yyy")
+SECOND = ("xx", "xy", "yy")
+THIRD = ("xxx", "xxy", "xyy", "yyy")
+FOURTH = ("xxxx", "xxxy", "xxyy", "xyyy", "yyyy")
+"""A sheet held along its edges needs it: a dome is 1 - xx - yy + xxyy."""
+WARPS = (SECOND, SECOND + THIRD, SECOND + FOURTH, SECOND + THIRD + FOURTH)
 
 
 def warp_shapes(points: Array, shapes: Sequence[str]) -> Array:
@@ -28,7 +31,14 @@ def warp_shapes(points: Array, shapes: Sequence[str]) -> Array:
     return np.asarray(curved / np.abs(curved).max(axis=0))
 
 
-def possible_shapes(points: Array, shapes: Sequence[str]) -> tuple[str, ...]:
-    """Return those of `shapes` that targets with these `points` (t, 3) can tell: across two columns none is curved."""
+def possible_warps(points: Array) -> list[tuple[str, ...]]:
+    """Return the sets of shapes that may be tried on a target with these `points` (t, 3), the largest last.
+
+    Across two columns nothing is curved, and across three nothing is curved twice.
+    """
     distinct = [len(np.unique(points[:, axis].round(9))) for axis in range(2)]
-    return tuple(s for s in shapes if s.count("x") < distinct[0] and s.count("y") < distinct[1])
+    told = [
+        tuple(shape for shape in shapes if shape.count("x") < distinct[0] and shape.count("y") < distinct[1])
+        for shapes in WARPS
+    ]
+    return [shapes for shapes in dict.fromkeys(told) if shapes]

@@ -7,6 +7,7 @@ plate could bulge as it likes, so that no bulge is taken for a joint's error.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from calib.likelihood.outliers import SetAside, misfits, softened
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
 from calib.session import Session
 from calib.targets import target_points
-from calib.warp import CUBIC, QUADRATIC, possible_shapes, warp_shapes
+from calib.warp import possible_warps, warp_shapes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -29,6 +30,8 @@ LEAST_TURN = np.pi / 2
 """Of a joint's travel (rad): over less, a once-per-turn error looks like another scale."""
 TOLD_APART = 1e-9
 """Part of a correction's information that the other parameters must leave it."""
+UNTOLD = 1e-13
+"""Part of the largest information of a direction that is no more than rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +79,59 @@ class Fit:
 
 @dataclass(frozen=True)
 class Candidate:
-    """Imperfections with one more, or one less, of `size` coefficients, and what these `gain` in 2 log L."""
+    """Imperfections with one more, or one less, of `size` coefficients, and what these `gain` in 2 log L.
+
+    Of one more, `values` is what the coefficients would be, about.
+    """
 
     imperfections: Imperfections
     size: int
     gain: float
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """Normal equations with some parameters at their best, whatever the others are.
+
+    All are in units `scale` (p,) in which the `information`'s diagonal is 1: what is left of it is the part that the
+    eliminated parameters leave, of which `known` (p, r) spans what is known.
+    """
+
+    information: Array
+    gradient: Array
+    scale: Array
+    known: Array
+
+    @classmethod
+    def of(cls, equations: NormalEquations, others: Ints) -> Self:
+        """Return the equations with the parameters `others` eliminated."""
+        scale = 1 / np.sqrt(np.maximum(np.diag(equations.information), 1e-300))
+        information = equations.information * np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(information[np.ix_(others, others)])
+        told = values > UNTOLD * max(values.max(initial=0), 1e-300)
+        known = np.zeros((len(scale), int(told.sum())))
+        known[others] = vectors[:, told] / np.sqrt(values[told])
+        return cls(information, equations.gradient * scale, scale, known)
+
+    def candidate(self, imperfections: Imperfections, own: Ints) -> Candidate:
+        """Return what the parameters `own` promise, directions that are told apart from nothing left at rest."""
+        values, vectors = np.linalg.eigh(self._left(own))
+        told = values > TOLD_APART
+        gradient = self.gradient[own] - self.information[own] @ self.known @ (self.known.T @ self.gradient)
+        step = -vectors[:, told] @ ((vectors.T @ gradient)[told] / values[told])
+        return Candidate(
+            imperfections, len(own), -float(step @ gradient), tuple((step * self.scale[own]).tolist())
+        )
+
+    def loss(self, own: Ints, values: Array) -> float:
+        """Return what is lost where the parameters `own` move from `values` to 0."""
+        scaled = values / self.scale[own]
+        return float(scaled @ self._left(own) @ scaled)
+
+    def _left(self, own: Ints) -> Array:
+        shared = self.information[own] @ self.known
+        return np.asarray(self.information[np.ix_(own, own)] - shared @ shared.T)
 
 
 def possible_corrections(problem: Problem, estimate: Estimate, about: Circumstances) -> list[Correction]:
@@ -148,32 +199,29 @@ def _names(about: Circumstances, imperfections: Imperfections) -> list[str]:
 
 
 def promised(fit: Fit, about: Circumstances, has: Imperfections) -> list[Candidate]:
-    """Return what each possible correction promises over the fit, which `has` some already, the best first."""
+    """Return what each possible correction, and warp of the target, promises over a fit that `has` some already."""
     options = [
         m for m in possible_corrections(fit.problem, fit.descent.estimate, about) if not _among(m, has.models)
     ]
-    shapes = [s for s in possible_shapes(about.points, (*QUADRATIC, *CUBIC)) if s not in has.warp]
-    every = Imperfections((*has.models, *options), (*has.warp, *shapes))
+    warps = [shapes for shapes in possible_warps(about.points) if set(shapes) > set(has.warp)]
+    every = Imperfections((*has.models, *options), warps[-1] if warps else has.warp)
     problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, about, has, every)
     evaluation = evaluate(problem, estimate, _lenient(fit, problem, estimate))
     equations = normal_equations(problem, estimate, evaluation)
     first = problem.layout.corrections.start + sum(len(model.coefficients) for model in has.models)
-    tried, bulging = np.arange(first, problem.layout.corrections.stop), problem.layout.warp
-    bulges = np.arange(bulging.start + len(has.warp), bulging.stop)
-    others = np.setdiff1d(np.flatnonzero(problem.free), tried)
-    left, pull = _eliminated(equations, others, tried)
-    found, column = [], 0
+    tried, bulging = np.arange(first, problem.layout.corrections.stop), problem.layout.warp.start
+    new = [bulging + index for index, shape in enumerate(every.warp) if shape not in has.warp]
+    settled = np.setdiff1d(np.flatnonzero(problem.free), tried)
+    bent, flat = Eliminated.of(equations, settled), Eliminated.of(equations, np.setdiff1d(settled, new))
+    found = []
     for model in options:
-        own = slice(column, column + len(model.coefficients))
-        gain = _gain(left[own, own], pull[own])
-        found.append(Candidate(replace(has, models=(*has.models, model)), own.stop - own.start, gain))
-        column = own.stop
-    own_shapes = [s for s in shapes if len(s) == min(map(len, shapes))]
-    if own_shapes:
-        left, pull = _eliminated(equations, np.setdiff1d(others, bulges), bulges[: len(own_shapes)])
-        warped = replace(has, warp=(*has.warp, *own_shapes))
-        found.append(Candidate(warped, len(own_shapes), _gain(left, pull)))
-    return sorted(found, key=lambda candidate: -candidate.gain)
+        own = first + np.arange(len(model.coefficients))
+        found.append(bent.candidate(replace(has, models=(*has.models, model)), own))
+        first += len(own)
+    for shapes in warps:
+        own = np.array([bulging + every.warp.index(shape) for shape in shapes if shape not in has.warp])
+        found.append(flat.candidate(replace(has, warp=shapes), own))
+    return found
 
 
 def worths(fit: Fit, has: Imperfections) -> list[Candidate]:
@@ -193,9 +241,8 @@ def worths(fit: Fit, has: Imperfections) -> list[Candidate]:
     for less, size in left_over:
         own = layout.corrections.start + np.arange(column, column + size)
         others = np.setdiff1d(np.flatnonzero(fit.problem.free), own)
-        information, _ = _eliminated(fit.descent.equations, others, own)
-        scaled = values[column : column + size] * np.sqrt(np.diag(fit.descent.equations.information)[own])
-        found.append(Candidate(less, size, float(scaled @ information @ scaled)))
+        gain = Eliminated.of(fit.descent.equations, others).loss(own, values[column : column + size])
+        found.append(Candidate(less, size, gain))
         column += size
     return found
 
@@ -219,25 +266,3 @@ def _lenient(fit: Fit, problem: Problem, estimate: Estimate) -> Weights:
         out = np.isin(group.data.views, fit.aside.views)
         groups.append(np.where(out[:, None], little, kept))
     return Weights(tuple(groups))
-
-
-def _eliminated(equations: NormalEquations, others: Ints, own: Ints) -> tuple[Array, Array]:
-    """Return the information and gradient of parameters `own`, all `others` at their best.
-
-    They are scaled so that the information's diagonal is the part that the others leave of it.
-    """
-    scale = 1 / np.sqrt(np.maximum(np.diag(equations.information), 1e-300))
-    information, gradient = equations.information * np.outer(scale, scale), equations.gradient * scale
-    values, vectors = np.linalg.eigh(information[np.ix_(others, others)])
-    known = values > 1e-13 * max(values.max(initial=0), 1e-300)
-    roots = vectors[:, known] / np.sqrt(values[known])
-    shared = roots.T @ information[np.ix_(others, own)]
-    left = information[np.ix_(own, own)] - shared.T @ shared
-    return np.asarray(left), np.asarray(gradient[own] - shared.T @ (roots.T @ gradient[others]))
-
-
-def _gain(information: Array, gradient: Array) -> float:
-    """Return what parameters gain at their best, directions that are told apart from nothing left out."""
-    values, vectors = np.linalg.eigh(information)
-    told = values > TOLD_APART
-    return float((((vectors.T @ gradient)[told]) ** 2 / values[told]).sum())

@@ -10,7 +10,7 @@ from calib.likelihood.building import Start, built
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
 from calib.likelihood.idle import as_the_views_follow
-from calib.likelihood.imperfections import Fit, Imperfections
+from calib.likelihood.imperfections import Candidate, Fit, Imperfections
 from calib.likelihood.lens_terms import lens_from_vector
 from calib.likelihood.noise import seen_noise
 from calib.likelihood.outliers import (
@@ -54,6 +54,7 @@ class Refined:
     set_aside: SetAside
     held_out: list[HeldOut]
     imperfections: Imperfections
+    unused_warp: Candidate | None
 
     @property
     def state(self) -> State:
@@ -101,7 +102,15 @@ def refine(
         descent.equations.information,
     )
     return Refined(
-        problem, weights, descent, covariance, float(np.sqrt(noise)), aside, predicted, found.imperfections
+        problem,
+        weights,
+        descent,
+        covariance,
+        float(np.sqrt(noise)),
+        aside,
+        predicted,
+        found.imperfections,
+        found.unused_warp,
     )
 
 

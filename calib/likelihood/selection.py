@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from calib.errors import UnsolvableError
 from calib.likelihood.descent import count_measurements
 from calib.likelihood.imperfections import (
     Candidate,
@@ -36,16 +37,19 @@ MOST_TRIES = 3
 MOST_ROUNDS = 12
 BELONGS = float(chi2.isf(RARE, 6))
 """The squared distance beyond which a view does not belong."""
+WORTH_TELLING = 0.02
+"""The part of the misfit that an unused warp of the target must explain to be told of."""
 HINT = 4.0
-"""What a coefficient must promise where readings count as noisy: noise hides most of what it would gain."""
+"""What a coefficient must promise where views count as scattered: that hides most of what it would gain."""
 
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """The fit with the imperfections that the data support."""
+    """The fit with the imperfections that the data support, and the target's warp that they would support as well."""
 
     fit: Fit
     imperfections: Imperfections
+    unused_warp: Candidate | None
 
 
 def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Selected:
@@ -56,15 +60,20 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
     about, has = Circumstances.of(session), Imperfections()
     given = np.array([joint.reading_std or 0.0 for joint in session.joints])
     for _ in range(MOST_ROUNDS):
-        candidates = [c for c in promised(fit, about, has) if target_warp or c.imperfections.warp == has.warp]
-        price = _price(fit, len(candidates))
+        every = promised(fit, about, has)
+        candidates = [c for c in every if target_warp or c.imperfections.warp == has.warp]
+        price = _price(fit, len(every))
         if weak := [kept for kept in worths(fit, has) if kept.gain <= price(kept)]:
             fit, has = _without(fit, refit, about, has, weak[-1].imperfections), weak[-1].imperfections
             continue
-        for candidate in _promising(candidates, price, noisy=bool((fit.problem.reading_std != given).any())):
+        scattered = fit.problem.looseness > 0 or bool((fit.problem.reading_std != given).any())
+        for candidate in _promising(candidates, price, scattered):
             wanted = candidate.imperfections
             problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, about, has, wanted)
-            trial = refit(replace(problem, reading_std=given, looseness=0.0), _as_read(estimate))
+            try:
+                trial = refit(replace(problem, reading_std=given, looseness=0.0), _as_read(estimate))
+            except UnsolvableError:
+                continue
             worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
             if min([gained(fit, trial), *worth]) <= price(candidate):
                 continue
@@ -74,7 +83,10 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
             break
         else:
             break
-    return Selected(fit, has)
+    worth_telling = WORTH_TELLING * count_measurements(fit.problem, fit.weights)
+    bulges = [c for c in every if c.imperfections.warp != has.warp and c.gain > max(price(c), worth_telling)]
+    best = max(bulges, key=lambda c: c.gain - price(c), default=None)
+    return Selected(fit, has, None if target_warp else best)
 
 
 def _without(fit: Fit, refit: Refit, about: Circumstances, has: Imperfections, wanted: Imperfections) -> Fit:
@@ -89,11 +101,11 @@ def _price(fit: Fit, candidates: int) -> Callable[[Candidate], float]:
 
 
 def _promising(
-    candidates: list[Candidate], price: Callable[[Candidate], float], noisy: bool
+    candidates: list[Candidate], price: Callable[[Candidate], float], scattered: bool
 ) -> list[Candidate]:
-    """Return the candidates that promise enough to be fitted, where readings count as `noisy` or not."""
-    enough = [c for c in candidates if c.gain > (HINT * c.size if noisy else price(c) / 2)]
-    return enough[:MOST_TRIES]
+    """Return the candidates that promise enough to be fitted, where views count as `scattered` or not."""
+    enough = [c for c in candidates if c.gain > (HINT * c.size if scattered else price(c) / 2)]
+    return sorted(enough, key=lambda c: price(c) - c.gain)[:MOST_TRIES]
 
 
 def _as_read(estimate: Estimate) -> Estimate:

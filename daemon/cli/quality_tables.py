@@ -20,12 +20,14 @@ COLUMNS: list[Column] = [
 
 
 def print_quality(quality: Quality) -> None:
-    """Print how well each joint's views agree, the views that agree worst, and the verdict."""
+    """Print how well each joint's views agree, the views that agree worst, what was corrected, and the verdict."""
     if quality.joints:
         output.print(joint_table(quality.joints))
     worst = worst_views(quality.views)
     if worst:
         output.print(view_table(worst))
+    for correction in quality.corrections:
+        output.print(correction, markup=False, soft_wrap=True)
     if quality.verdict is not None:
         output.print(quality.verdict, markup=False, soft_wrap=True)
 

@@ -45,18 +45,25 @@ def solve(
             help="A parameter that is kept instead of found, such as pan.scale or main.k3=0. May be repeated.",
         ),
     ] = None,
+    target_warp: Annotated[
+        bool, typer.Option("--target-warp", help="Let the target bulge, if the data support it.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration as JSON.")] = False,
 ) -> None:
     """Calibrate from a session's views: chain, camera on it, base and lens, with no initial guess."""
     from calib import solve as solve_session
 
+    if target_warp and method is Method.closed_form:
+        raise typer.BadParameter(
+            "--target-warp: the closed form takes every target for flat; use --method ml"
+        )
     loaded = load_session(session)
     try:
         holding = loaded.holding(dict(map(_held, hold or [])))
     except FormatError as error:
         raise typer.BadParameter(str(error)) from None
     with progress_line() as progress:
-        calibration = solve_session(holding, method.value, progress)
+        calibration = solve_session(holding, method.value, progress, target_warp=target_warp)
     save_calibration(calibration, result)
     # A session that cannot be written to is solved all the same.
     with suppress(OSError):
