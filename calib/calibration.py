@@ -180,6 +180,8 @@ class Calibration(Document):
     quality: Quality
     target: StoredTarget | None = None
     origin: WorldOrigin | None = None
+    held: dict[str, Number | Triple] = Field(default_factory=dict)
+    """What was not found but held, by the name of the parameter, and at what."""
 
     @model_validator(mode="after")
     def _sizes_agree(self) -> Self:

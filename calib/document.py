@@ -18,6 +18,7 @@ from calib.calibration import (
 from calib.chain import Chain
 from calib.dh_covariance import dh_covariance
 from calib.links import Links, based, links_of
+from calib.parameters import held_values
 from calib.session import Session
 from calib.solution import Solution
 from calib.stated_corrections import stated_corrections
@@ -61,6 +62,7 @@ def document(session: Session, method: Method, solution: Solution, quality: Qual
         quality=quality,
         target=session.target,
         origin=solution.origin,
+        held=held_values(session),
     )
 
 

@@ -115,4 +115,12 @@ def print_calibration(calibration: Calibration) -> None:
     if calibration.joints:
         output.print(joints)
     output.print(lenses)
+    if calibration.held:
+        held = ", ".join(f"{name} at {_as_written(value)}" for name, value in calibration.held.items())
+        output.print(f"Held, not found: {held}", soft_wrap=True)
     print_quality(calibration.quality)
+
+
+def _as_written(value: Held) -> str:
+    """Return a held value as `--hold` takes it."""
+    return ",".join(f"{number:.9g}" for number in (value if isinstance(value, list) else [value]))

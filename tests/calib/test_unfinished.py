@@ -71,3 +71,9 @@ def test_a_joint_that_did_not_turn_is_refused() -> None:
     still = session.views[1].model_copy(update={"world_from_camera": session.views[0].world_from_camera})
     with pytest.raises(UnsolvableError, match="did not turn"):
         solve(session.with_views([session.views[0], still]))
+
+
+def test_what_is_held_of_a_joint_that_was_not_begun_does_not_matter() -> None:
+    held = {"j0.scale": float(RIG.scales[0]), "j1.scale": 1.0}
+    calibration = solve(cut_off(4), hold=held)
+    assert calibration.held == {"j0.scale": RIG.scales[0]}

@@ -35,7 +35,20 @@ def test_what_is_held_is_in_the_result_and_not_in_the_session(
     assert pan["scale"] == pytest.approx(0.017453292519943295, rel=1e-15)
     assert pan["axis"] == pytest.approx(axis.tolist(), abs=1e-15)
     assert found["cameras"][0]["intrinsics"]["fx"] == found["cameras"][0]["intrinsics"]["fy"]
+    assert found["held"] == {
+        "pan.scale": pan["scale"],
+        "slide.scale": 0.001,
+        "main.aspect": 1.0,
+        "pan.axis": pytest.approx((2 * axis).tolist()),
+    }
     assert session.read_text() == before
+
+
+def test_what_is_held_is_printed(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hold = ["--hold", "slide.scale", "--hold", "pan.axis=0.02,0.9,-0.5", "--method", "closed_form"]
+    with pytest.raises(SystemExit):
+        main(["solve", str(session), "-o", str(session.with_name("c.json")), *hold])
+    assert "Held, not found: slide.scale at 0.001, pan.axis at 0.02,0.9,-0.5" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
