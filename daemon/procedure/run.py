@@ -135,6 +135,8 @@ class Run:
             self.record = replace(self.record, state=RunState.FAILED, error=error, ended_at=datetime.now(UTC))
         if error is not None:
             logger.warning("run '%s' %s: %s", self.record.id, self.record.state, error)
+        elif conclusion is not None:
+            logger.info("run '%s' succeeded: %s", self.record.id, conclusion.calibration.quality.verdict)
         self._on_end(kept, None if conclusion is None else conclusion.calibration)
         self.log.add(
             Finished(state=self.record.state, error=error, calibration_id=self.record.calibration_id)

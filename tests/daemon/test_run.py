@@ -47,7 +47,10 @@ def of(events: list[RunEvent], kind: str) -> list[Any]:
     return [event for event in events if event.type == kind]
 
 
-async def test_a_run_ends_with_an_active_calibration(service: Service) -> None:
+async def test_a_run_ends_with_an_active_calibration(
+    service: Service, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
     run, events = await finish(service, await service.runs.start("anna", "first light"))
     assert run.state is RunState.SUCCEEDED
     assert run.error is None
@@ -56,7 +59,11 @@ async def test_a_run_ends_with_an_active_calibration(service: Service) -> None:
     assert [event.joint for event in of(events, "joint")] == ["slide", "pan", None]
     assert events[1].type == "plan"
     assert events[1].views == len(of(events, "moving")) == len(of(events, "view")) == 10
-    assert of(events, "solved")[0].quality["rms_px"] < 0.2
+    quality = of(events, "solved")[0].quality
+    assert quality["rms_px"] < 0.2
+    assert quality["verdict"].lower().startswith(quality["judgement"])
+    assert f"run '{run.id}' succeeded: {quality['verdict']}" in caplog.messages
+    assert [entry.verdict for entry in await service.store.calibrations()] == [quality["verdict"]]
     assert of(events, "verification")[0].result["views"] == 2
     assert events[-1].type == "finished"
     assert events[-1].calibration_id == run.calibration_id == service.poses.calibration_id
