@@ -27,9 +27,9 @@ TOGETHER = float(np.sqrt(3) / 2)
 ACCOMPLICE = 0.5
 """Standard deviation, in tolerances, from which on a quantity is named beside one that matters."""
 MINOR = 0.1
-"""Part of the worst known one's, in tolerances, below which it is not named."""
+"""Part of the worst known one's standard deviation, in tolerances, below which it is not named."""
 NOT_AT_ALL = 10.0
-"""And from which on figures no longer mean anything, those of all else included."""
+"""Standard deviation, in tolerances, from which on figures mean nothing any more, those of all else included."""
 WORTHWHILE = 1.2
 """How many times better known something must become for a change to be worth its while."""
 
