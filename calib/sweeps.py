@@ -34,8 +34,9 @@ def sweep_labels(readings: Array, exercised: Ints, cameras: Ints, links: Sequenc
 def _starts(idle: Array, moved: Array) -> Ints:
     """Return for each view (n,) which start it belongs to, -1 for one that stands alone at its start.
 
-    Starts may be close to each other, and idle readings may jitter: where every view shares its idle ones exactly
-    with a view at another reading, starts are told apart exactly, else within a tolerance.
+    Starts may be close to each other, and idle readings may jitter, between a few counts too: where every view shares
+    its idle ones exactly with a view at another reading, and one start's views come after another's, starts are told
+    apart exactly, else within a tolerance.
     """
     labels = np.zeros(len(idle), dtype=np.intp)
     for tolerance in (EXACTLY, SAME_START):
@@ -43,9 +44,14 @@ def _starts(idle: Array, moved: Array) -> Ints:
         for label in np.unique(labels):
             if np.ptp(moved[labels == label]) == 0:
                 labels[labels == label] = -1
-        if (labels >= 0).all():
+        if (labels >= 0).all() and not _interleaved(labels):
             break
     return labels
+
+
+def _interleaved(labels: Ints) -> bool:
+    """Return whether a label comes up again after another one."""
+    return bool(np.count_nonzero(np.diff(labels)) >= len(np.unique(labels)))
 
 
 def readings_at_rest(readings: Array, labels: Ints) -> Array:

@@ -71,3 +71,12 @@ def test_another_rig_is_refused(calibration: Calibration) -> None:
         view["joint"] = {"pan": "tilt"}.get(view["joint"], view["joint"])
     with pytest.raises(FormatError, match="are not the calibration's"):
         verify(calibration, Session.model_validate(document))
+
+
+def test_an_idle_joint_that_jitters_between_two_counts_leaves_a_sweep_whole(calibration: Calibration) -> None:
+    document = SESSION.model_dump(exclude_unset=True)
+    for index, view in enumerate(document["views"]):
+        if view["joint"] == "pan":
+            view["readings"][0] += 0.005 * (index % 2)
+    _, pan = verify(calibration, Session.model_validate(document)).travel
+    assert len(pan.rows) == len([view for view in plan(verify=True) if view["joint"] == "pan"]) - 1
