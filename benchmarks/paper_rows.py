@@ -1,6 +1,6 @@
 """The rows of the paper's tables 1 to 4, and those of our runs that belong to them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,12 +8,10 @@ import numpy as np
 
 from calib import paper
 from calib.session import JointKind
-from calib.verification import Travel, Verification
+from calib.verification import Verification
 
 LIKE = 0.02
 """Share by which our travel may differ from the paper's to stand in its row."""
-
-Measure = Callable[[Travel], float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,25 +43,15 @@ PREDICTION_TABLES: Final = (
 )
 
 
-def against_encoder(travel: Travel) -> float | None:
-    """Return the error as the paper has it: predicted against the encoder's own measure."""
-    return None if travel.encoder is None else abs(travel.predicted - travel.encoder)
-
-
-def against_pictures(travel: Travel) -> float | None:
-    """Return the error against the camera poses of the pictures themselves."""
-    return abs(travel.predicted - travel.measured)
-
-
-def travel_errors(verdict: Verification, table: TravelTable, measure: Measure) -> dict[int, float]:
-    """Return our error for each row of `table` that was travelled, by the row's place."""
+def travel_errors(verdict: Verification, table: TravelTable) -> dict[int, float]:
+    """Return our error against the encoder for each row of `table` that was travelled, by the row's place."""
     rows = [row for joint in verdict.travel if joint.kind == table.kind for row in joint.rows]
     found = {}
     for place, travel in enumerate(table.travels):
         nearest = min(rows, key=lambda row: abs(row.predicted - travel), default=None)
-        error = None if nearest is None else measure(nearest)
-        if nearest is not None and error is not None and abs(nearest.predicted - travel) <= LIKE * travel:
-            found[place] = error
+        if nearest is None or nearest.encoder is None or abs(nearest.predicted - travel) > LIKE * travel:
+            continue
+        found[place] = abs(nearest.predicted - nearest.encoder)
     return found
 
 

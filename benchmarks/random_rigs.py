@@ -18,6 +18,7 @@ LENS = np.array([1500.0, 1500.0, 640.0, 480.0, -0.1, 0.05, 0.0, 0.0, 0.0])
 """fx fy cx cy (px), then OpenCV's k1 k2 p1 p2 k3."""
 TARGET = {"kind": "chessboard", "rows": 6, "columns": 7, "pitch": 0.03}
 POINTS = np.array([[column * 0.03, row * 0.03, 0.0] for row in range(6) for column in range(7)])
+UNITS = {"revolute": "deg", "prismatic": "mm"}
 
 VIEWS = 9
 """Of each joint."""
@@ -127,18 +128,17 @@ def session_of_views(
         }
         for (joint, at), seen in zip(plan, pixels, strict=True)
     ]
-    units = {"revolute": "deg", "prismatic": "mm"}
-    joints = [
-        {"name": f"j{i}", "kind": kind, "reading_unit": units[kind]}
-        for i, kind in enumerate(looking.rig.kinds)
-    ]
-    return Session.model_validate(
-        {
-            "format": SESSION_FORMAT,
-            "joints": joints,
-            "cameras": [{"name": "main", "width": WIDTH, "height": HEIGHT}],
-            "target": TARGET,
-            "views": views,
-        }
-        | keys
-    )
+    return Session.model_validate(session_header(looking) | {"views": views} | keys)
+
+
+def session_header(looking: LookingRig) -> dict[str, Any]:
+    """Return all that a session of the rig says before its views."""
+    return {
+        "format": SESSION_FORMAT,
+        "joints": [
+            {"name": f"j{joint}", "kind": kind, "reading_unit": UNITS[kind]}
+            for joint, kind in enumerate(looking.rig.kinds)
+        ],
+        "cameras": [{"name": "main", "width": WIDTH, "height": HEIGHT}],
+        "target": TARGET,
+    }
