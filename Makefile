@@ -3,10 +3,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PEERS := .venv-peers
 PROFILE ?= paper-table
 DATA ?= activecam-data
 
-.PHONY: demo test lint format serve bench clean
+.PHONY: demo test lint format serve bench bench-peers figures clean
 
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
@@ -30,6 +31,12 @@ serve: $(VENV)/.installed ## The daemon on PROFILE, with its data in DATA
 bench: $(VENV)/.installed-dev ## What we claim about accuracy and speed, measured
 	$(BIN)/python -m benchmarks
 
+bench-peers: $(VENV)/.installed-dev $(PEERS)/.installed ## The calibration beside other packages, which need an environment of their own
+	$(BIN)/python -m benchmarks peers
+
+figures: $(VENV)/.installed-docs ## The documentation's measured figures, drawn anew
+	$(BIN)/python -m benchmarks.uncertainty_figure docs/explanation/uncertainty.svg
+
 $(VENV)/bin/python:
 	scripts/make-venv "$(PYTHON)" "$(VENV)"
 
@@ -41,5 +48,14 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[dev]' --constraint constraints.txt
 	touch $@
 
+$(VENV)/.installed-docs: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --editable '.[docs]' --constraint constraints.txt
+	touch $@
+
+$(PEERS)/.installed: benchmarks/peers-requirements.txt
+	scripts/make-venv "$(PYTHON)" "$(PEERS)"
+	$(PEERS)/bin/python -m pip install --quiet --requirement $<
+	touch $@
+
 clean: ## Take away what was installed and cached here
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(PEERS) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
