@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.corrections import Corrections, coefficient_paths
+from calib.errors import UnsolvableError
 from calib.likelihood.building import Start
 from calib.likelihood.document_covariance import document_jacobian
 from calib.likelihood.measurements import PointViews
@@ -31,13 +32,21 @@ def most_likely(
 ) -> Solution:
     """Return the most likely solution near the closed form's, with its covariance and what did not belong.
 
-    Imperfect joints are corrected where the data support it, and with `target_warp` the target's bulge.
+    Imperfect joints are corrected where the data support it, and with `target_warp` the target's bulge. Raises
+    UnsolvableError where the views contradict each other, or what is known beforehand, beyond measure.
     """
     assert start.mounts is not None
     oriented = _as_the_chain_has_it(session, start, observations)
-    refined = refine(
-        session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior), target_warp
-    )
+    try:
+        refined = refine(
+            session, oriented, Start(start.chain, start.mounts, start.lenses, start.prior), target_warp
+        )
+    except np.linalg.LinAlgError as error:
+        # So far from what was measured the noise that would explain it has no bounds.
+        raise UnsolvableError(
+            "the views contradict each other, or what is held or known beforehand, too much to be fitted: "
+            "are the readings, the target, and the values that are held right?"
+        ) from error
     state, aside, found = refined.state, refined.set_aside, refined.imperfections
     unused = refined.unused_warp
     return replace(

@@ -16,7 +16,7 @@ from calib.lens_prior import LensPrior
 from calib.parameters import LENS_NAMES
 from calib.session import Session
 from calib.units import nominal_scale
-from tests.calib.scenes import DISK_CENTRES, DISKS, points_session, two_axis_rig
+from tests.calib.scenes import DISK_CENTRES, DISKS, plan, points_session, two_axis_rig
 
 OFF = 4e-4
 """By how much, relative to it, a true scale differs from what the unit says."""
@@ -232,6 +232,27 @@ def test_what_is_held_far_from_the_truth_is_said_to_disagree() -> None:
     assert len(aside) > len(session.views) / 4
     assert calibration.covariance is not None
     assert np.isfinite(calibration.covariance.matrix).all()
+
+
+@pytest.mark.parametrize(
+    ("held", "noise"),
+    [({"slide.scale": 0.00101}, 0.0), ({"pan.axis": [0, 1, 0.4]}, 0.1), ({"main.fx": 3000}, 0.1)],
+)
+def test_what_contradicts_the_views_ends_in_warnings_or_a_sentence(
+    held: dict[str, Any], noise: float
+) -> None:
+    target = {"kind": "chessboard", "rows": 6, "columns": 7, "pitch": 0.03}
+    session = points_session(two_axis_rig(), plan(), target, DISK_CENTRES)
+    rng, document = np.random.default_rng(0), session.model_dump(exclude_unset=True)
+    for view in document["views"]:
+        pixels = np.array(view["points"]["pixels"])
+        view["points"]["pixels"] = (pixels + noise * rng.normal(size=pixels.shape)).tolist()
+    try:
+        said = solve(Session.model_validate(document), hold=held).quality.warnings
+    except UnsolvableError as error:
+        said = [str(error)]
+    told = ("does not agree with the others", "set aside", "that are held right?")
+    assert any(words in sentence for sentence in said for words in told), said
 
 
 @pytest.mark.parametrize(
