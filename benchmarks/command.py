@@ -10,7 +10,16 @@ from rich.markup import escape
 
 from benchmarks.printing import console, say
 
-NAMES: Final = ("solve_time", "detection_time", "pose_rate", "efficiency", "pictures", "paper_table", "peers")
+NAMES: Final = (
+    "solve_time",
+    "solve_growth",
+    "detection_time",
+    "pose_rate",
+    "efficiency",
+    "pictures",
+    "paper_table",
+    "peers",
+)
 """In the order in which they run, the quick ones first."""
 
 

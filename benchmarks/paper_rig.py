@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from calib import Session
 from calib.session import SESSION_FORMAT
+from calib.targets import Target, target_points
 from daemon.profile import Profile, load_profile
 from drivers.clock import SystemClock
 from drivers.simulated.world import SimulatedWorld
@@ -37,12 +38,16 @@ def swept_readings(views: int) -> list[tuple[str, tuple[float, float]]]:
     return slide + [("pan", (NEAR_MM, float(v))) for v in np.linspace(*PAN_DEG, views - straight)]
 
 
-def session_of_points(views: int, noise_px: float, seed: int = 0) -> Session:
-    """Return a session whose views carry all 42 points of the target, each pixel off by `noise_px` (std)."""
+def session_of_points(views: int, noise_px: float, seed: int = 0, target: Target | None = None) -> Session:
+    """Return a session whose views carry all points of `target`, each pixel off by `noise_px` (std).
+
+    It is the profile's target with its 42 points unless another is given, which is to be no larger.
+    """
     profile = paper_profile()
-    world = paper_world(profile)
-    points, rng = world.target_points(), np.random.default_rng(seed)
+    world, target = paper_world(profile), target or profile.target
+    points, rng = target_points(target), np.random.default_rng(seed)
     empty = profile.empty_session().model_dump(mode="json", exclude_unset=True)
+    empty["target"] = target.model_dump(mode="json")
     taken = []
     for joint, readings in swept_readings(views):
         seen = world.project(points, readings)

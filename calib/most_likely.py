@@ -56,7 +56,7 @@ def most_likely(
         lenses=refined.lenses(),
         covariance=_document_covariance(session, refined),
         left_out=(aside.views, aside.points),
-        held_out=refined.held_out,
+        refined=refined,
         noise_px=_point_noise(refined.problem),
         weaknesses=weaknesses(session, refined),
         corrections=Corrections(found.models, state.corrections),

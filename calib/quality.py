@@ -59,8 +59,8 @@ def judged(
 ) -> Quality:
     """Return how well the calibration explains each view, those of the fit and those held out.
 
-    Where no view is marked `verify`, the solution tells how well each is predicted by the others. What was set aside
-    counts nowhere but in its own view.
+    Where no view is marked `verify`, the solution's fit tells how well each is predicted by the others. What was set
+    aside counts nowhere but in its own view.
     """
     residuals = view_residuals(calibration, session, observations)
     aside = set(solution.left_out[0])
@@ -79,7 +79,7 @@ def judged(
     verify = {view: miss for view, miss in misses.items() if uses[view] == "verify"}
     by_others = {
         error.view: Miss(fitted[error.view].points, error.rms_px, error.position_m, error.rotation_rad)
-        for error in solution.held_out
+        for error in (solution.refined.held_out() if solution.refined else ())
     }
     held_out = verify or by_others
     held_out_by: Literal["verify", "leave_one_view_out"] = "verify" if verify else "leave_one_view_out"

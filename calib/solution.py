@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from calib.chain import Chain
 from calib.corrections import NO_CORRECTIONS, Corrections
-from calib.likelihood.held_out import HeldOut
+from calib.likelihood.refinement import Refined
 from calib.likelihood.weakness import Weakness
 from calib.session import Intrinsics, WorldOrigin
 
@@ -20,9 +20,9 @@ class Solution:
     """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens; None where there is none.
 
     `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
-    their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `held_out` how
-    well each view is predicted by the fit of all others, `weaknesses` what the views leave in the dark, `noise_px`
-    how much single points scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
+    their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `refined` the
+    fit that it is from, if any, `weaknesses` what the views leave in the dark, `noise_px` how much single points
+    scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
     (4, 4) its base. `corrections` are what imperfect joints add to their readings, `warp` the height (m) of each
     shape of the target's, and `unused_warp` about what that would be where the data support one that nobody asked
     for.
@@ -34,7 +34,7 @@ class Solution:
     origin: WorldOrigin | None = None
     covariance: tuple[list[str], Array] | None = None
     left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
-    held_out: Sequence[HeldOut] = ()
+    refined: Refined | None = None
     weaknesses: Sequence[Weakness] = ()
     noise_px: float | None = None
     prior: Array | None = None

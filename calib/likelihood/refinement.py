@@ -43,7 +43,7 @@ class Refined:
     """The most likely calibration.
 
     `covariance` (p, p) is of a step of `problem.layout`'s parameters, `noise` the standard deviation of one
-    measurement in units of what it was taken for, `held_out` how well each view is predicted by the others.
+    measurement in units of what it was taken for.
     """
 
     problem: Problem
@@ -52,7 +52,6 @@ class Refined:
     covariance: Array
     noise: float
     set_aside: SetAside
-    held_out: list[HeldOut]
     imperfections: Imperfections
     unused_warp: Candidate | None
 
@@ -68,6 +67,19 @@ class Refined:
             None if values is None else lens_from_vector(values, likes[camera])
             for camera, values in enumerate(self.state.lenses)
         ]
+
+    def held_out(self) -> list[HeldOut]:
+        """Return how well each view is predicted by the fit of all others."""
+        estimate = self.descent.estimate
+        as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
+        return held_out(
+            self.problem,
+            estimate,
+            self.weights,
+            self.descent.evaluation,
+            evaluate(self.problem, as_read, self.weights),
+            self.descent.equations.information,
+        )
 
 
 def refine(
@@ -89,18 +101,8 @@ def refine(
         found.fit.aside,
         found.fit.descent,
     )
-    estimate = descent.estimate
     noise = noise_variance(problem, descent, weights)
     covariance = step_covariance(problem, descent, noise)
-    as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
-    predicted = held_out(
-        problem,
-        estimate,
-        weights,
-        descent.evaluation,
-        evaluate(problem, as_read, weights),
-        descent.equations.information,
-    )
     return Refined(
         problem,
         weights,
@@ -108,7 +110,6 @@ def refine(
         covariance,
         float(np.sqrt(noise)),
         aside,
-        predicted,
         found.imperfections,
         found.unused_warp,
     )
