@@ -56,7 +56,9 @@ def document(session: Session, method: Method, solution: Solution, quality: Qual
         ],
         world_from_base=links.world_from_base.tolist(),
         cameras=[_camera(session, index, solution, links) for index in range(len(session.cameras))],
-        corrections=stated_corrections(names, solution.corrections, solution.warp, deviations),
+        corrections=stated_corrections(
+            names, solution.corrections, solution.warp, solution.aspects, deviations
+        ),
         range=[[float(lo), float(hi)] for lo, hi in zip(ranges.min(axis=0), ranges.max(axis=0), strict=True)],
         covariance=_covariance(solution),
         quality=quality,

@@ -21,7 +21,7 @@ from calib.observations import Observation
 from calib.residuals import read_as_predicted
 from calib.session import Session
 from calib.solution import Solution
-from calib.stated_corrections import warp_paths
+from calib.stated_corrections import aspect_paths, warp_paths
 from calib.targets import NoTarget, Target
 
 Array = NDArray[np.float64]
@@ -64,6 +64,10 @@ def most_likely(
         unused_warp={}
         if unused is None
         else dict(zip(unused.imperfections.warp, unused.values, strict=True)),
+        aspects={
+            session.cameras[camera].name: float(aspect)
+            for camera, aspect in zip(found.sensors, state.aspects, strict=True)
+        },
     )
 
 
@@ -98,7 +102,11 @@ def _as_the_chain_has_it(
 def _document_covariance(session: Session, refined: Refined) -> tuple[list[str], Array]:
     models = [None if lens is None else lens.model for lens in refined.lenses()]
     found = refined.imperfections
-    paths = [*coefficient_paths(found.models), *warp_paths(len(found.warp))]
+    paths = [
+        *coefficient_paths(found.models),
+        *warp_paths(len(found.warp)),
+        *aspect_paths(len(found.sensors)),
+    ]
     names, jacobian = document_jacobian(refined.state, refined.problem.layout, models, paths)
     covariance = jacobian @ refined.covariance @ jacobian.T
     # A print that is larger than it says scales every length, and shows in no residual.

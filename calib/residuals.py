@@ -14,6 +14,7 @@ from calib.likelihood.blocks import disk_offsets
 from calib.likelihood.measurements import point_views
 from calib.observations import Observation
 from calib.pose_from_view import pose_from_view
+from calib.pose_sensor import without_aspect
 from calib.session import Intrinsics, Session
 from calib.targets import Target, disk_diameter, target_points, target_symmetries
 from calib.transforms import inverse, pose_error
@@ -94,7 +95,7 @@ def _of_poses(
         if calibration.joints:
             view = session.views[observation.view]
             predicted = calibration.world_from_camera(view.readings, camera, view.approached)
-            measured = observation.pose
+            measured = without_aspect(observation.pose, calibration.corrections.aspect_of(camera))
         residuals.append(ViewResidual(observation.view, None, predicted, measured))
     return residuals
 

@@ -25,7 +25,7 @@ class Solution:
     scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
     (4, 4) its base. `corrections` are what imperfect joints add to their readings, `warp` the height (m) of each
     shape of the target's, and `unused_warp` about what that would be where the data support one that nobody asked
-    for.
+    for; `aspects` by how much a sensor that gives poses sees y too large.
     """
 
     chain: Chain
@@ -42,3 +42,4 @@ class Solution:
     corrections: Corrections = NO_CORRECTIONS
     warp: dict[str, float] = field(default_factory=dict)
     unused_warp: dict[str, float] = field(default_factory=dict)
+    aspects: dict[str, float] = field(default_factory=dict)

@@ -72,18 +72,31 @@ class TargetWarp(Document):
         return np.asarray(warp_shapes(points, self.shapes) @ np.array(self.heights, dtype=float))
 
 
+class StatedAspect(Document):
+    """By how much a camera's given poses have the target too far out in y, in its frame, as a part of it."""
+
+    camera: str
+    aspect: Number
+    aspect_std: Number | None = None
+
+
 class StatedCorrections(Document):
-    """What the data supported beyond perfect joints and a flat target; empty where it was nothing."""
+    """What the data supported beyond perfect joints, a flat target and straight sensors; empty where it was nothing."""
 
     backlash: list[StatedBacklash] = Field(default_factory=list)
     once_per_turn: list[StatedOncePerTurn] = Field(default_factory=list)
     coupling: list[StatedCoupling] = Field(default_factory=list)
     target_warp: TargetWarp | None = None
+    aspect: list[StatedAspect] = Field(default_factory=list)
 
     @model_serializer(mode="wrap")
     def _what_there_is(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         written: dict[str, Any] = handler(self)
         return {key: value for key, value in written.items() if value not in ([], None)}
+
+    def aspect_of(self, camera: str) -> float:
+        """Return by how much the camera's given poses have the target too far out in y, as a part of it."""
+        return next((one.aspect for one in self.aspect if one.camera == camera), 0.0)
 
     def joint_names(self) -> list[str]:
         """Return the names of the joints that these speak of."""
@@ -110,10 +123,12 @@ def stated_corrections(
     joints: Sequence[str],
     corrections: Corrections,
     warp: Mapping[str, float],
+    aspects: Mapping[str, float],
     deviations: Mapping[str, float],
 ) -> StatedCorrections:
-    """Return what a calibration states of `corrections` and of the target's `warp`, the height (m) of each shape.
+    """Return what a calibration states of `corrections`, `warp` and `aspects`.
 
+    `warp` is the height (m) of each of the target's shapes, `aspects` those of the poses given for each camera,
     `deviations` are the standard deviations of the calibration's numbers by their paths.
     """
     stated: dict[str, Any] = {}
@@ -133,12 +148,21 @@ def stated_corrections(
             "heights": list(warp.values()),
             "heights_std": [deviations[path] for path in warp_paths(len(warp)) if path in deviations] or None,
         }
+    stated["aspect"] = [
+        {"camera": camera, "aspect": aspect, "aspect_std": deviations.get(path)}
+        for (camera, aspect), path in zip(aspects.items(), aspect_paths(len(aspects)), strict=True)
+    ]
     return StatedCorrections.model_validate(stated)
 
 
 def warp_paths(count: int) -> list[str]:
     """Return the dotted paths in a calibration of the warp's heights."""
     return [f"corrections.target_warp.heights.{index}" for index in range(count)]
+
+
+def aspect_paths(count: int) -> list[str]:
+    """Return the dotted paths in a calibration of sensors' aspects."""
+    return [f"corrections.aspect.{index}.aspect" for index in range(count)]
 
 
 def corrections_in_words(
@@ -167,6 +191,11 @@ def corrections_in_words(
         bulge = 1e3 * float(np.ptp(stated.target_warp.bulge(points)))
         deviation = 1e3 * max(stated.target_warp.heights_std or [0.0])
         sentences.append(f"the target is {_size(bulge, deviation, 'mm')} from flat, taken into account")
+    for one in stated.aspect:
+        size = _size(1e2 * one.aspect, 1e2 * (one.aspect_std or 0), "%")
+        sentences.append(
+            f"{one.camera}: the poses given for it have the target too far out in y by {size}, taken into account"
+        )
     return sentences
 
 

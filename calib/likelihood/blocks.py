@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from calib.disks import centroid_offsets
 from calib.likelihood.lens_terms import pixel_terms
 from calib.likelihood.measurements import GivenPoses, PointViews
+from calib.pose_sensor import ASPECT, without_aspect
 from calib.session import Intrinsics
 from calib.transforms import inverse, rotation_log
 from calib.twists import skew
@@ -79,9 +80,16 @@ def point_blocks(
     return _blocks(residuals, flat, jacobian.reshape(*jacobian.shape[:2], -1))
 
 
-def pose_blocks(given: GivenPoses, poses: Array, weights: Array) -> Blocks:
-    """Return the blocks of views whose cameras are predicted at `poses` (n, 4, 4); `weights` (n, 6)."""
-    residuals, jacobian = pose_residuals(given.poses, poses)
+def pose_blocks(given: GivenPoses, poses: Array, weights: Array, own: Array, aspects: Array) -> Blocks:
+    """Return the blocks of views whose cameras are predicted at `poses` (n, 4, 4); `weights` (n, 6).
+
+    `own` (a,) tells which of the `aspects` (a,) is that of the sensor that gave the poses.
+    """
+    measured = without_aspect(given.poses, float(own @ aspects))
+    residuals, jacobian = pose_residuals(measured, poses)
+    by_aspect = np.zeros((len(poses), 6, len(own)))
+    by_aspect[:, 3:] = (inverse(given.poses)[:, :3, 3] * ASPECT)[..., None] * own
+    jacobian = np.concatenate([jacobian, by_aspect], axis=2)
     whitened, root = residuals @ given.whitening.T, np.sqrt(weights)
     by_twist = np.swapaxes(given.whitening @ jacobian, 1, 2)
     return _blocks(whitened[..., None], whitened * root, by_twist * root[:, None])

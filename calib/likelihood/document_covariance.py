@@ -17,7 +17,7 @@ def document_jacobian(
 ) -> tuple[list[str], Array]:
     """Return the dotted paths of a calibration's numbers, and their derivatives (d, p) by the parameters.
 
-    `corrections` are the paths of the readings' corrections and of the target's warp.
+    `corrections` are the paths of the readings' corrections, of the target's warp and of sensors' aspects.
     """
     names: list[str] = []
     rows: list[Array] = []
@@ -51,7 +51,7 @@ def document_jacobian(
             by_lens = np.zeros((len(LENS_NAMES[model]), count))
             by_lens[:, layout.lenses[camera]] = layout.lens_changes[camera]
             add([f"cameras.{camera}.intrinsics.{path}" for path in lens_paths(model)], by_lens)
-    add(list(corrections), np.eye(count)[layout.corrections.start : layout.warp.stop])
+    add(list(corrections), np.eye(count)[layout.corrections.start : layout.aspects.stop])
     return names, np.array(rows)
 
 

@@ -2,7 +2,7 @@
 
 A fit is widened by corrections that are still zero. What each would gain in twice the log-likelihood then follows from
 one Newton step, the other parameters following: g' H^-1 g with all others eliminated. Joints are judged as if the
-plate could bulge as it likes, so that no bulge is taken for a joint's error.
+plate could bulge, and a sensor see askew, as they like, so that neither is taken for a joint's error.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calib.corrections import Backlash, Correction, Coupling, OncePerTurn, regressors
 from calib.likelihood.descent import Descent
+from calib.likelihood.measurements import GivenPoses
 from calib.likelihood.normal import NormalEquations, normal_equations
 from calib.likelihood.outliers import SetAside, misfits, softened
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
@@ -61,10 +62,14 @@ class Circumstances:
 
 @dataclass(frozen=True)
 class Imperfections:
-    """What is corrected: readings by `models`, the target's points by the shapes `warp`."""
+    """What is corrected: readings by `models`, the target's points by the shapes `warp`.
+
+    `sensors` are the cameras whose given poses have an aspect.
+    """
 
     models: tuple[Correction, ...] = ()
     warp: tuple[str, ...] = ()
+    sensors: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +172,12 @@ def with_imperfections(
     """
     layout, state = problem.layout, estimate.state
     first, names = layout.corrections.start, _names(about, wanted)
-    middle, end = first + sum(len(model.coefficients) for model in wanted.models), first + len(names)
-    known = dict(zip(_names(about, has), [*state.corrections, *state.warp], strict=True))
-    values = np.array([known.get(name, 0.0) for name in names])
+    end = first + len(names)
+    middle = first + sum(len(model.coefficients) for model in wanted.models)
+    last = middle + len(wanted.warp)
+    known = dict(zip(_names(about, has), [*state.corrections, *state.warp, *state.aspects], strict=True))
+    values = np.zeros(end)
+    values[first:] = [known.get(name, 0.0) for name in names]
     prior, travel = np.zeros((end, end)), np.zeros(end)
     prior[:first, :first], travel[:first] = problem.prior[:first, :first], estimate.travel[:first]
     changed = replace(
@@ -178,14 +186,18 @@ def with_imperfections(
             layout,
             names=(*layout.names[:first], *names),
             corrections=slice(first, middle),
-            warp=slice(middle, end),
+            warp=slice(middle, last),
+            aspects=slice(last, end),
         ),
         regressors=regressors(wanted.models, problem.readings, about.sides),
         bulges=warp_shapes(about.points, wanted.warp),
         free=np.concatenate([problem.free[:first], np.ones(len(names), dtype=bool)]),
         prior=prior,
+        sensors=wanted.sensors,
     )
-    state = replace(state, corrections=values[: middle - first], warp=values[middle - first :])
+    state = replace(
+        state, corrections=values[first:middle], warp=values[middle:last], aspects=values[last:end]
+    )
     return changed, replace(estimate, state=state, travel=travel)
 
 
@@ -195,7 +207,8 @@ def _names(about: Circumstances, imperfections: Imperfections) -> list[str]:
     for model in imperfections.models:
         by = f" by {about.joints[model.by]}" if isinstance(model, Coupling) else ""
         names += [f"{about.joints[model.joint]}.{model.kind}{by}.{part}" for part in model.coefficients]
-    return names + [f"target.{shape}" for shape in imperfections.warp]
+    names += [f"target.{shape}" for shape in imperfections.warp]
+    return names + [f"aspect.{camera}" for camera in imperfections.sensors]
 
 
 def promised(fit: Fit, about: Circumstances, has: Imperfections) -> list[Candidate]:
@@ -204,15 +217,20 @@ def promised(fit: Fit, about: Circumstances, has: Imperfections) -> list[Candida
         m for m in possible_corrections(fit.problem, fit.descent.estimate, about) if not _among(m, has.models)
     ]
     warps = [shapes for shapes in possible_warps(about.points) if set(shapes) > set(has.warp)]
-    every = Imperfections((*has.models, *options), warps[-1] if warps else has.warp)
+    sensors = [camera for camera in _sensors(fit.problem) if camera not in has.sensors]
+    every = Imperfections((*has.models, *options), warps[-1] if warps else has.warp, (*has.sensors, *sensors))
     problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, about, has, every)
     evaluation = evaluate(problem, estimate, _lenient(fit, problem, estimate))
     equations = normal_equations(problem, estimate, evaluation)
     first = problem.layout.corrections.start + sum(len(model.coefficients) for model in has.models)
     tried, bulging = np.arange(first, problem.layout.corrections.stop), problem.layout.warp.start
     new = [bulging + index for index, shape in enumerate(every.warp) if shape not in has.warp]
+    aspects = np.arange(problem.layout.aspects.stop - len(sensors), problem.layout.aspects.stop)
     settled = np.setdiff1d(np.flatnonzero(problem.free), tried)
-    bent, flat = Eliminated.of(equations, settled), Eliminated.of(equations, np.setdiff1d(settled, new))
+    bent, flat = (
+        Eliminated.of(equations, settled),
+        Eliminated.of(equations, np.setdiff1d(settled, [*new, *aspects])),
+    )
     found = []
     for model in options:
         own = first + np.arange(len(model.coefficients))
@@ -221,22 +239,27 @@ def promised(fit: Fit, about: Circumstances, has: Imperfections) -> list[Candida
     for shapes in warps:
         own = np.array([bulging + every.warp.index(shape) for shape in shapes if shape not in has.warp])
         found.append(flat.candidate(replace(has, warp=shapes), own))
+    for camera, place in zip(sensors, aspects, strict=True):
+        found.append(flat.candidate(replace(has, sensors=(*has.sensors, camera)), np.array([place])))
     return found
 
 
 def worths(fit: Fit, has: Imperfections) -> list[Candidate]:
-    """Return what the fit would lose without each of the joint corrections, and without the warp, that it `has`.
+    """Return what the fit would lose without each of the joint corrections, the warp, and each aspect that it `has`.
 
     Each is named by what would be left.
     """
     layout, state = fit.problem.layout, fit.descent.estimate.state
-    values = np.concatenate([state.corrections, state.warp])
+    values = np.concatenate([state.corrections, state.warp, state.aspects])
     left_over = [
         (replace(has, models=(*has.models[:i], *has.models[i + 1 :])), len(model.coefficients))
         for i, model in enumerate(has.models)
     ]
     if has.warp:
         left_over.append((replace(has, warp=()), len(has.warp)))
+    for camera in has.sensors:
+        rest = tuple(other for other in has.sensors if other != camera)
+        left_over.append((replace(has, sensors=rest), 1))
     found, column = [], 0
     for less, size in left_over:
         own = layout.corrections.start + np.arange(column, column + size)
@@ -245,6 +268,11 @@ def worths(fit: Fit, has: Imperfections) -> list[Candidate]:
         found.append(Candidate(less, size, gain))
         column += size
     return found
+
+
+def _sensors(problem: Problem) -> list[int]:
+    """Return the cameras whose poses another system gave."""
+    return [group.camera for group in problem.groups if isinstance(group.data, GivenPoses)]
 
 
 def _among(model: Correction, models: Sequence[Correction]) -> bool:

@@ -52,7 +52,11 @@ def local_by_parameter(problem: Problem, group: Group, terms: GroupTerms) -> Arr
     """Return how each view's local vector changes with the parameters (n, d, p)."""
     layout, by_pose = problem.layout, terms.chain.by_parameter
     if not isinstance(group.data, PointViews):
-        return by_pose
+        count = layout.aspects.stop - layout.aspects.start
+        local = np.zeros((len(by_pose), 6 + count, len(layout)))
+        local[:, :6] = by_pose
+        local[:, 6:, layout.aspects] = np.eye(count)
+        return local
     lens, warp = layout.lenses[group.camera], layout.warp
     bent = 6 + lens.stop - lens.start
     local = np.zeros((len(by_pose), bent + warp.stop - warp.start, len(layout)))

@@ -110,7 +110,7 @@ def _freedom(distances: Array) -> int:
 
 def given_distances(blocks: Blocks, scatter: Array) -> Array:
     """Return the squared misfits (n, 2) of given poses' rotations and positions, their views scattered (n, 6, 6)."""
-    jacobian, misfit = blocks.jacobian, blocks.residuals[..., 0]
+    jacobian, misfit = blocks.jacobian[:, :, :6], blocks.residuals[..., 0]
     covariance = np.eye(6) + jacobian @ scatter @ np.swapaxes(jacobian, 1, 2)
     parts = []
     for part in (slice(0, 3), slice(3, 6)):

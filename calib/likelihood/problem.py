@@ -34,7 +34,7 @@ class Problem:
     has: the mean of an idle joint's readings over a sweep has less. `looseness` says how many times the covariance
     that its points give a view's pose its distance from the chain has beyond that. `free` (p,) are the parameters that
     may move, `prior` (p, p) the information that says how far from the start. `bulges` (t, w) are the shapes of the
-    target's warp at its points.
+    target's warp at its points, `sensors` (a,) the cameras whose given poses may have an aspect.
     """
 
     layout: Layout
@@ -48,6 +48,7 @@ class Problem:
     prior: Array
     disk_diameter: float | None
     bulges: Array
+    sensors: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,8 @@ def evaluate(problem: Problem, estimate: Estimate, weights: Weights) -> Evaluati
                 group.data, chain.poses, lens, group.lens.model, offset, weight, bulges @ state.warp, bulges
             )
         else:
-            blocks = pose_blocks(group.data, chain.poses, weight)
+            own = np.array([float(camera == group.camera) for camera in problem.sensors])
+            blocks = pose_blocks(group.data, chain.poses, weight, own, state.aspects)
         terms.append(GroupTerms(chain, blocks))
         cost += float(said(problem, group, blocks)[2].sum())
     noisy = problem.reading_std > 0

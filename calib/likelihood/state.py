@@ -6,7 +6,7 @@ thus a twist of the chain somewhere, or a number of the lens.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 class State:
     """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens as a vector, None for none.
 
-    `corrections` (k,) are coefficients of what is added to readings, `warp` (w,) of what is added to the target.
+    `corrections` (k,) are coefficients of what is added to readings, `warp` (w,) of what is added to the target,
+    `aspects` (a,) by how much some sensors that give poses see y too large.
     """
 
     chain: Chain
@@ -31,6 +32,7 @@ class State:
     lenses: tuple[Array | None, ...]
     corrections: Array
     warp: Array
+    aspects: Array = field(default_factory=lambda: np.zeros(0))
 
     def moved(self, step: Array, layout: "Layout") -> "State":
         """Return the state after a step (p,) of the layout's parameters."""
@@ -53,6 +55,7 @@ class State:
             ),
             corrections=self.corrections + step[layout.corrections],
             warp=self.warp + step[layout.warp],
+            aspects=self.aspects + step[layout.aspects],
         )
 
 
@@ -71,6 +74,7 @@ class Layout:
     lens_changes: tuple[Array, ...]
     corrections: slice
     warp: slice
+    aspects: slice
 
     def __len__(self) -> int:
         return len(self.names)
@@ -115,6 +119,7 @@ class Layout:
             ),
             corrections=take("correction", *corrections),
             warp=take("warp", *warp),
+            aspects=take("aspect"),
             names=tuple(names),
         )
 
