@@ -45,7 +45,11 @@ class LookingRig:
 
     def pixels(self, readings: Array) -> Array:
         """Return where the board's corners are seen (n, points, 2) at readings (n, m)."""
-        return project(self.rig.poses(readings), self.lens)
+        return self.seen_from(self.rig.poses(readings))
+
+    def seen_from(self, poses: Array) -> Array:
+        """Return where the camera sees the board's corners (n, points, 2) from poses (n, 4, 4)."""
+        return project(poses, self.lens)
 
 
 def project(poses: Array, lens: Array = LENS) -> Array:

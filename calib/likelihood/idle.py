@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.closed_form import PoseViews
-from calib.likelihood.problem import Evaluation, Problem, said
+from calib.likelihood.descent import descend
+from calib.likelihood.problem import Estimate, Problem, Weights
 from calib.session import Session
 from calib.sweeps import readings_at_rest, sweep_labels
 
@@ -30,25 +31,22 @@ def at_rest(session: Session) -> tuple[Array, Array]:
     return readings_at_rest(every.readings, labels), noisiness
 
 
-def as_the_views_follow(problem: Problem, there: Evaluation, as_read: Array) -> Problem:
-    """Return the problem with the readings `as_read` (n, m) of those joints whose jitter the views follow.
+def as_the_views_follow(
+    problem: Problem, estimate: Estimate, weights: Weights, as_read: Array
+) -> tuple[Problem, Estimate]:
+    """Return the problem with the readings `as_read` (n, m) of those joints whose jitter the views follow, and its fit.
 
-    `there` is the likelihood with all joints at rest. A step along the jitter gains there exactly where more than
-    half of it is in the views.
+    Each joint is given the readings, at rest or not, with which the fit is the more likely.
     """
-    jitter = as_read - problem.readings
-    if not jitter.any():
-        return problem
-    slope, bend = np.zeros(jitter.shape[1]), np.zeros(jitter.shape[1])
-    for group, terms in zip(problem.groups, there.terms, strict=True):
-        views = group.data.views
-        hessian, gradient, _ = said(problem, group, terms.blocks)
-        moved = terms.chain.by_reading * (jitter / problem.noisiness)[views][:, None, :]
-        slope += np.einsum("nkm,nk->m", moved, gradient[:, :6])
-        bend += np.einsum("nkm,nkl,nlm->m", moved, hessian[:, :6, :6], moved)
-    follows = 2 * slope + bend < 0
-    return replace(
-        problem,
-        readings=np.where(follows, as_read, problem.readings),
-        noisiness=np.where(follows, 1.0, problem.noisiness),
-    )
+    jitters = np.flatnonzero((problem.readings != as_read).any(axis=0))
+    if not len(jitters):
+        return problem, estimate
+    best = descend(problem, estimate, weights)
+    for joint in jitters:
+        readings, noisiness = problem.readings.copy(), problem.noisiness.copy()
+        readings[:, joint], noisiness[:, joint] = as_read[:, joint], 1.0
+        moving = replace(problem, readings=readings, noisiness=noisiness)
+        tried = descend(moving, best.estimate, weights)
+        if tried.evaluation.cost < best.evaluation.cost:
+            problem, best = moving, tried
+    return problem, best.estimate

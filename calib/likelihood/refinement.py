@@ -122,7 +122,7 @@ def _settled(problem: Problem, estimate: Estimate, as_read: Array, unknown: NDAr
     readings' noise nobody said.
     """
     problem, estimate, weights, aside = _approached(problem, estimate)
-    problem = as_the_views_follow(problem, evaluate(problem, estimate, weights), as_read)
+    problem, estimate = as_the_views_follow(problem, estimate, weights, as_read)
     for _ in range(MOST_PASSES):
         descent = descend(problem, estimate, weights)
         estimate, known = descent.estimate, step_covariance(problem, descent, 1.0)

@@ -10,12 +10,13 @@ from calib.chain import Chain
 from calib.corrections import Backlash, Coupling, OncePerTurn
 from calib.first_solution import camera_views, first_solution
 from calib.lens import project_points
-from calib.likelihood.blocks import pose_residuals
+from calib.likelihood.blocks import pose_blocks, pose_residuals
 from calib.likelihood.building import Start, built
 from calib.likelihood.chain_terms import chain_terms
 from calib.likelihood.document_covariance import document_jacobian
 from calib.likelihood.imperfections import Circumstances, Imperfections, with_imperfections
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector, pixel_terms
+from calib.likelihood.measurements import GivenPoses
 from calib.likelihood.normal import normal_equations
 from calib.likelihood.problem import Estimate, all_in, evaluate
 from calib.likelihood.state import Layout, State
@@ -105,6 +106,19 @@ def test_given_poses_by_the_camera() -> None:
         there, _ = pose_residuals(measured, predicted @ exp_twist(step))
         back, _ = pose_residuals(measured, predicted @ exp_twist(-step))
         assert np.allclose(jacobian[..., k], (there - back) / (2 * STEP), atol=1e-6)
+
+
+def test_given_poses_by_their_sensors_aspect() -> None:
+    measured = exp_twist(RNG.normal(size=(5, 6)))
+    given = GivenPoses(np.arange(5), measured, np.diag(np.arange(1.0, 7)))
+    aspects, own, weights = np.array([0.1, -0.2]), np.array([0.0, 1.0]), np.full((5, 6), 0.5)
+    predicted = measured @ exp_twist(0.1 * RNG.normal(size=(5, 6)))
+    blocks = pose_blocks(given, predicted, weights, own, aspects)
+    for k, step in enumerate(STEP * np.eye(2)):
+        there = pose_blocks(given, predicted, weights, own, aspects + step).residuals
+        back = pose_blocks(given, predicted, weights, own, aspects - step).residuals
+        expected = np.sqrt(0.5) * (there - back)[..., 0] / (2 * STEP)
+        assert np.allclose(blocks.jacobian[:, :, 6 + k], expected, atol=1e-6)
 
 
 def document_numbers(state: State) -> dict[str, float]:
