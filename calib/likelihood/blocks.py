@@ -143,6 +143,20 @@ def disk_offsets(seen: PointViews, poses: Array, lens: Intrinsics, diameter: flo
     return offsets
 
 
+def rescaled(blocks: Blocks, size: Array) -> Blocks:
+    """Return blocks in which everything counts, with residuals in units of `size`, of each row (r,) or of all ()."""
+    flat = blocks.residuals.reshape(len(blocks.residuals), -1) / size
+    transposed = np.swapaxes(blocks.jacobian, 1, 2) / size
+    return _blocks(flat.reshape(blocks.residuals.shape), flat, transposed)
+
+
+def weighed(blocks: Blocks, weights: Array) -> Blocks:
+    """Return blocks in which everything counts with the `weights` (n, q) of points, or (n, 6) of given poses."""
+    flat = blocks.residuals.reshape(len(weights), -1)
+    root = np.repeat(np.sqrt(weights), flat.shape[1] // weights.shape[1], axis=1)
+    return _blocks(blocks.residuals, flat * root, np.swapaxes(blocks.jacobian, 1, 2) * root[:, None])
+
+
 def _whiten(rows: Array, whitening: Array) -> None:
     """Multiply what belongs to the coordinates of points, `rows` (2, ..., n, q), by `whitening` (n, q, 2, 2)."""
     rows[1] *= whitening[..., 1, 1]

@@ -16,7 +16,7 @@ from calib.corrections import Backlash, Correction, Coupling, OncePerTurn, regre
 from calib.likelihood.descent import Descent
 from calib.likelihood.measurements import GivenPoses
 from calib.likelihood.normal import NormalEquations, normal_equations
-from calib.likelihood.outliers import SetAside, misfits, softened
+from calib.likelihood.outliers import SetAside, freed_views, misfits, softened
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
 from calib.session import Session
 from calib.targets import target_points
@@ -288,7 +288,9 @@ def _lenient(fit: Fit, problem: Problem, estimate: Estimate) -> Weights:
         return fit.weights
     as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
     everything = evaluate(problem, as_read, all_in(problem))
-    soft = softened(problem, misfits(problem, everything, all_in(problem), np.zeros_like(problem.prior)))
+    freed = freed_views(problem, everything.terms)
+    found = misfits(problem, everything.terms, freed, all_in(problem), np.zeros_like(problem.prior))
+    soft = softened(problem, found)
     groups = []
     for group, kept, little in zip(problem.groups, fit.weights.groups, soft.groups, strict=True):
         out = np.isin(group.data.views, fit.aside.views)

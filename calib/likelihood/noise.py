@@ -1,13 +1,15 @@
 """How noisy each kind of measurement is seen to be: points, given poses, and what else scatters the views."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.likelihood.measurements import GivenPoses, PointViews
-from calib.likelihood.outliers import Misfits, misfits, point_noise
-from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, all_in, evaluate
+from calib.likelihood.blocks import rescaled, weighed
+from calib.likelihood.measurements import PointViews
+from calib.likelihood.outliers import Freed, Misfits, freed_views, misfits, point_noise
+from calib.likelihood.problem import Estimate, Evaluation, GroupTerms, Problem, Weights, all_in, evaluate
 from calib.likelihood.scatter import PoseMisfit, Scatter, estimated_scatter
 
 Array = NDArray[np.float64]
@@ -31,51 +33,64 @@ def seen_noise(
     views is asked for where it is said of which joints (m,) the readings' noise is `unknown`.
     """
     as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
-    there = evaluate(problem, estimate, all_in(problem))
-    scaled = _with_measurement_noise(problem, there, weights)
+    everything = all_in(problem)
+    there = evaluate(problem, estimate, everything)
+    read = evaluate(problem, as_read, everything) if estimate.reading_errors.any() else there
+    freed = freed_views(problem, read.terms)
+    sizes = _sizes(problem, there, freed, weights)
+    groups = [
+        replace(group, data=replace(group.data, whitening=group.data.whitening / size[..., None]))
+        for group, size in zip(problem.groups, sizes, strict=True)
+    ]
+    scaled = replace(problem, groups=tuple(groups))
+    terms = [
+        replace(own, blocks=rescaled(own.blocks, size)) for own, size in zip(read.terms, sizes, strict=True)
+    ]
+    freed = [view and view.rescaled(float(size)) for view, size in zip(freed, sizes, strict=True)]
     if unknown is not None:
-        scatter = _scatter(scaled, evaluate(scaled, as_read, weights), weights, unknown)
+        scatter = _scatter(scaled, terms, weights, unknown)
         scaled = replace(scaled, reading_std=scatter.readings, looseness=scatter.looseness)
-    found = misfits(scaled, evaluate(scaled, as_read, all_in(scaled)), weights, covariance)
+    found = misfits(scaled, terms, freed, weights, covariance)
     return scaled, found, _much_the_same(problem, scaled)
 
 
-def _with_measurement_noise(problem: Problem, everything: Evaluation, weights: Weights) -> Problem:
-    """Return the problem with whitenings under which misfits have unit variance."""
-    spent = int(problem.free.sum())
-    groups = []
-    for group, terms, weight in zip(problem.groups, everything.terms, weights.groups, strict=True):
+def _sizes(
+    problem: Problem, there: Evaluation, freed: Sequence[Freed | None], weights: Weights
+) -> list[Array]:
+    """Return each group's standard deviations of whitened measurements: one of points (), six of given poses (6,)."""
+    spent, sizes = int(problem.free.sum()), []
+    for group, terms, view, weight in zip(problem.groups, there.terms, freed, weights.groups, strict=True):
         if isinstance(group.data, PointViews):
-            scale = point_noise(terms.blocks, group.data.present)
-            data: PointViews | GivenPoses = replace(group.data, whitening=group.data.whitening / scale)
+            assert view is not None
+            sizes.append(np.array(point_noise(view.left, group.data.present)))
         else:
-            residuals = terms.blocks.residuals[..., 0] @ np.linalg.inv(group.data.whitening).T
-            data = replace(group.data, whitening=_whitening(np.asarray(residuals, float), weight, spent))
-        groups.append(replace(group, data=data))
-    return replace(problem, groups=tuple(groups))
+            least = LEAST_POSE_NOISE * np.diag(group.data.whitening)
+            sizes.append(np.hypot(_pose_sizes(terms.blocks.residuals[..., 0], weight, spent), least))
+    return sizes
 
 
-def _whitening(residuals: Array, weight: Array, spent: int) -> Array:
-    """Return the matrix (6, 6) that whitens pose residuals (n, 6), of which `spent` numbers were fitted away.
+def _pose_sizes(residuals: Array, weight: Array, spent: int) -> Array:
+    """Return the sizes (6,) of pose residuals (n, 6), of which `spent` numbers were fitted away.
 
-    Rotations and positions have a size each: more cannot be told from a few dozen poses without being misled.
+    Rotations and positions have one each: more cannot be told from a few dozen poses without being misled.
     """
     freedom = max((int((weight > 0).sum()) - spent) / 6, 1.0)
     variance = (weight * residuals**2).sum(axis=0) / freedom
-    sizes = np.repeat(variance.reshape(2, 3).mean(axis=1), 3)
-    return np.diag(1 / np.sqrt(sizes + LEAST_POSE_NOISE**2))
+    return np.asarray(np.sqrt(np.repeat(variance.reshape(2, 3).mean(axis=1), 3)))
 
 
-def _scatter(problem: Problem, there: Evaluation, weights: Weights, unknown: NDArray[np.bool_]) -> Scatter:
-    """Return what scatters the views; `there` is where the readings are taken as they were read."""
+def _scatter(
+    problem: Problem, terms: Sequence[GroupTerms], weights: Weights, unknown: NDArray[np.bool_]
+) -> Scatter:
+    """Return what scatters the views; in `terms` everything counts and readings are taken as they were read."""
     misfits = []
-    for group, terms, weight in zip(problem.groups, there.terms, weights.groups, strict=True):
-        kept, blocks = weight.any(axis=1), terms.blocks
+    for group, own, weight in zip(problem.groups, terms, weights.groups, strict=True):
+        kept, blocks = weight.any(axis=1), weighed(own.blocks, weight)
         misfits.append(
             PoseMisfit(
                 information=blocks.hessian[kept, :6, :6],
                 gradient=blocks.gradient[kept, :6],
-                by_reading=terms.chain.by_reading[kept],
+                by_reading=own.chain.by_reading[kept],
                 loose=isinstance(group.data, PointViews),
             )
         )

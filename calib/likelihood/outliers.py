@@ -5,6 +5,7 @@ it: a view whose readings are wrong is far off. What then remains at a point tel
 against the median of all, so that neither the noise's size nor a few outliers matter.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.stats import chi2, f
 
 from calib.likelihood.blocks import Blocks
 from calib.likelihood.measurements import PointViews
-from calib.likelihood.problem import Evaluation, Problem, Weights, all_in
+from calib.likelihood.problem import GroupTerms, Problem, Weights, all_in
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,8 @@ KNOCKED = 3 * float(f.isf(1e-3, 3, STUDENT))
 EXACT = 0.1
 LEAST_POINT_NOISE = 1e-5
 """In px, or of what a covariance says: better is not measured, and made-up points may be exact."""
+FARTHEST = {freedom: float(chi2.isf(RARE, freedom)) for freedom in (2, 6)}
+"""How far the square of so many numbers of unit variance may be for good ones."""
 MEDIAN = {freedom: float(chi2.median(freedom)) for freedom in (2, 3, 6)}
 
 
@@ -51,6 +54,10 @@ class Freed:
     information: Array
     left: Array
 
+    def rescaled(self, size: float) -> "Freed":
+        """Return the same with misfits in units of `size`."""
+        return Freed(self.shift, self.information / size**2, self.left / size**2)
+
     def distance(self, scatter: Array, looseness: float) -> Array:
         """Return the squared distances (n, 1) in units of their loosened noise and `scatter` (n, 6, 6)."""
         covariance = (1 + looseness) * np.linalg.inv(self.information) + scatter
@@ -72,26 +79,41 @@ class Misfits:
     spread: float
 
 
-def misfits(problem: Problem, evaluation: Evaluation, weights: Weights, covariance: Array) -> Misfits:
-    """Return the misfits at an evaluation in which everything counts and readings are taken as they were read.
+def freed_views(problem: Problem, terms: Sequence[GroupTerms]) -> list[Freed | None]:
+    """Return each group's views with their poses freed; in the groups' terms everything counts.
 
-    A view that `weights` leave out is predicted by a fit that knows nothing of it: `covariance` (p, p) says how well.
+    Given poses have nothing beside them that could be bad: None.
+    """
+    return [
+        _freed(own.blocks, group.data.present) if isinstance(group.data, PointViews) else None
+        for group, own in zip(problem.groups, terms, strict=True)
+    ]
+
+
+def misfits(
+    problem: Problem,
+    terms: Sequence[GroupTerms],
+    freed: Sequence[Freed | None],
+    weights: Weights,
+    covariance: Array,
+) -> Misfits:
+    """Return the misfits; in the groups' `terms` everything counts and readings are taken as they were read.
+
+    `freed` are the groups' views as of `freed_views`. A view that `weights` leave out is predicted by a fit that knows
+    nothing of it: `covariance` (p, p) says how well.
     """
     distances, lefts, typical, typical_point = [], [], [], []
-    for group, terms, present, weight in zip(
-        problem.groups, evaluation.terms, all_in(problem).groups, weights.groups, strict=True
-    ):
-        spread = terms.chain.by_reading * problem.reading_std
+    for own, view, present, weight in zip(terms, freed, all_in(problem).groups, weights.groups, strict=True):
+        spread = own.chain.by_reading * problem.reading_std
         scatter = spread @ np.swapaxes(spread, 1, 2)
         out = ~weight.any(axis=1)
-        unseen = terms.chain.by_parameter[out]
+        unseen = own.chain.by_parameter[out]
         scatter[out] += unseen @ covariance @ np.swapaxes(unseen, 1, 2)
-        if isinstance(group.data, PointViews):
-            view = _freed(terms.blocks, present)
+        if view is not None:
             distance, left = view.distance(scatter, problem.looseness), view.left
             typical_point.append(left[present > 0])
         else:
-            distance, left = given_distances(terms.blocks, scatter), np.zeros((len(weight), 0))
+            distance, left = given_distances(own.blocks, scatter), np.zeros((len(weight), 0))
         distances.append(np.nan_to_num(distance, nan=np.inf))
         lefts.append(left)
         typical.append(distances[-1].ravel() / MEDIAN[_freedom(distance)])
@@ -141,7 +163,7 @@ def judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
     for group, base, left, distance in zip(
         problem.groups, all_in(problem).groups, found.left, found.distances, strict=True
     ):
-        farthest = chi2.isf(RARE, 6) if isinstance(group.data, PointViews) else KNOCKED
+        farthest = FARTHEST[6] if isinstance(group.data, PointViews) else KNOCKED
         # A view that the prediction puts behind the camera has no distance at all.
         out = np.any(~(distance <= farthest * found.spread), axis=1)
         knocked += group.data.views[out].tolist()
@@ -149,21 +171,20 @@ def judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
             tails = (STUDENT + 3) / (STUDENT + distance)
             groups.append(np.where(out[:, None], 0.0, base * np.repeat(tails, 3, axis=1)))
             continue
-        wrong = ~(left <= chi2.isf(RARE, 2) * found.noise) & (base > 0)
+        wrong = ~(left <= FARTHEST[2] * found.noise) & (base > 0)
         rows, columns = np.nonzero(wrong & ~out[:, None])
         bad += zip(group.data.views[rows].tolist(), group.data.ids[rows, columns].tolist(), strict=True)
         groups.append(np.where(wrong | out[:, None], 0.0, base))
     return Weights(tuple(groups)), SetAside(tuple(sorted(knocked)), tuple(sorted(bad)))
 
 
-def point_noise(blocks: Blocks, present: Array) -> float:
-    """Return the standard deviation of a whitened point measurement, from misfits with each view's pose free.
+def point_noise(left: Array, present: Array) -> float:
+    """Return the standard deviation of a whitened point measurement, from what is `left` with each view's pose free.
 
     Bad points are left out, so that what remains is a truncated noise: the few good ones lost do not matter.
     """
-    left = _freed(blocks, present).left
     first = float(np.nanmedian(left[present > 0])) / MEDIAN[2]
-    good = (present > 0) & (left < chi2.isf(RARE, 2) * first)
+    good = (present > 0) & (left < FARTHEST[2] * first)
     freedom = 2 * good.sum() - 6 * len(left)
     return max(float(np.sqrt(left[good].sum() / max(freedom, 1))), LEAST_POINT_NOISE)
 
