@@ -9,7 +9,8 @@ an empty endpoint or of the paper from the same run, and what is timed is timed 
     pose_rate      with its servers (pose_server, bare_server; server_process) and its client (http_client)
     true_rig, random_rigs   rigs with known truth, and sessions of theirs with noise
     efficiency     with the bound that it judges by (cramer_rao)
-    pictures       with its rendered rigs (rendered_rigs), and what a calibration predicts of them (predicted)
+    uncertainty    and its figure in the documentation (uncertainty_figure)
+    pictures       with its rendered rigs (rendered_rigs)
     peers          with what they are given (peer_cases), and their own environment (peer_solvers)
     paper_table    with its runs (paper_run), and the rows of both sides (paper_rows)
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.paper_rig import paper_profile, paper_world
-from benchmarks.predicted import predicted_pixels
 from calib import Calibration, Session, Verification, load_session, solve, verify
 from calib.document import Method
 from daemon.procedure.events import Finished
@@ -104,5 +103,5 @@ def _point_error(profile: Profile, world: SimulatedWorld, calibration: Calibrati
     planned = [view for view in profile.procedure.planned_views() if view.use == "verify"]
     readings, points = np.array([list(view.readings.values()) for view in planned]), world.target_points()
     true = np.array([world.project(points, vector) for vector in readings])
-    away = predicted_pixels(calibration, points, readings) - true
+    away = calibration.project(points, readings) - true
     return float(np.median(np.linalg.norm(away, axis=-1)))

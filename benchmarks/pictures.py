@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.predicted import predicted_pixels
 from benchmarks.printing import console, say, table
 from benchmarks.random_rigs import VIEWS
 from benchmarks.rendered_rigs import readings_in_picture, rendered_rig, rendered_session
@@ -71,7 +70,7 @@ def predict(seed: int, joints: int) -> dict[Method, Predicted]:
         session = rendered_session(looking, world, readings, Path(folder), rng)
         for method in METHODS:
             calibration = solve(session, method)
-            away = predicted_pixels(calibration, world.target_points(), readings) - true
+            away = calibration.project(world.target_points(), readings) - true
             views = [view.mean_px for view in verify(calibration, session).per_view]
             found[method] = Predicted(np.linalg.norm(away, axis=-1).ravel(), np.array(views, dtype=float))
     return found
