@@ -12,7 +12,8 @@ from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, eva
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 60
+MOST_STEPS = 1000
+"""Taken or refused: ten are usual, but where little is told, the way down is long, narrow and bent."""
 MOST_ROUNDS = 5
 CONVERGED = 1e-3
 """What a step gains in twice the log-likelihood below which a round is over: the next one gains far less."""
