@@ -12,17 +12,11 @@ from benchmarks.printing import console, say
 
 NAMES: Final = (
     "solve_time",
-NAMES: Final = (
-    "solve_time",
     "solve_growth",
     "detection_time",
     "pose_rate",
     "efficiency",
     "uncertainty",
-    "pictures",
-    "paper_table",
-    "peers",
-)
     "pictures",
     "paper_table",
     "peers",
