@@ -7,7 +7,7 @@ served pose and its covariance all take their corrections from here.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,7 +68,22 @@ class Coupling:
 Correction = Backlash | OncePerTurn | Coupling
 
 
-def regressors(models: Sequence[Correction], readings: Array, sides: Array) -> Array:
+class Model(Protocol):
+    """What adds to the readings of one joint."""
+
+    @property
+    def joint(self) -> int:
+        """Whose readings it adds to."""
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """What its coefficients are called."""
+
+    def regressors(self, readings: Array, sides: Array) -> Array:
+        """Return how much of each coefficient is added to the joint's readings (n, k)."""
+
+
+def regressors(models: Sequence[Model], readings: Array, sides: Array) -> Array:
     """Return how much of each of the models' k coefficients is added to each reading (n, m, k).
 
     `readings` (n, m); `sides` (n, m) from which each was approached: +1 from below, -1 from above, 0 not known.

@@ -13,6 +13,7 @@ from calib.corrections import Corrections, coefficient_paths
 from calib.errors import UnsolvableError
 from calib.likelihood.building import Start
 from calib.likelihood.document_covariance import document_jacobian
+from calib.likelihood.imperfections import Circumstances
 from calib.likelihood.measurements import PointViews
 from calib.likelihood.problem import Problem
 from calib.likelihood.refinement import Refined, refine
@@ -48,7 +49,7 @@ def most_likely(
             "are the readings, the target, and the values that are held right?"
         ) from error
     state, aside, found = refined.state, refined.set_aside, refined.imperfections
-    unused = refined.unused_warp
+    unused, (stated, places) = refined.unused_warp, found.stated()
     return replace(
         start,
         chain=state.chain,
@@ -59,7 +60,8 @@ def most_likely(
         refined=refined,
         noise_px=_point_noise(refined.problem),
         weaknesses=weaknesses(session, refined),
-        corrections=Corrections(found.models, state.corrections),
+        corrections=Corrections(stated, state.corrections[places]),
+        sides=found.sides(Circumstances.of(session), state.corrections),
         warp=dict(zip(found.warp, state.warp.tolist(), strict=True)),
         unused_warp={}
         if unused is None
@@ -102,12 +104,13 @@ def _as_the_chain_has_it(
 def _document_covariance(session: Session, refined: Refined) -> tuple[list[str], Array]:
     models = [None if lens is None else lens.model for lens in refined.lenses()]
     found = refined.imperfections
-    paths = [
-        *coefficient_paths(found.models),
-        *warp_paths(len(found.warp)),
-        *aspect_paths(len(found.sensors)),
-    ]
-    names, jacobian = document_jacobian(refined.state, refined.problem.layout, models, paths)
+    layout, (stated, places) = refined.problem.layout, found.stated()
+    where = {
+        path: layout.corrections.start + k for path, k in zip(coefficient_paths(stated), places, strict=True)
+    }
+    where |= {path: layout.warp.start + k for k, path in enumerate(warp_paths(len(found.warp)))}
+    where |= {path: layout.aspects.start + k for k, path in enumerate(aspect_paths(len(found.sensors)))}
+    names, jacobian = document_jacobian(refined.state, layout, models, where)
     covariance = jacobian @ refined.covariance @ jacobian.T
     # A print that is larger than it says scales every length, and shows in no residual.
     size = _lengths(names, refined) * _print_scale_std(session.target)

@@ -307,6 +307,17 @@ class Session(Document):
         """Return the readings of all views (n, m)."""
         return np.array([view.readings for view in self.views], dtype=float).reshape(len(self.views), -1)
 
+    def approached_from(self, sides: NDArray[np.float64] | None) -> Self:
+        """Return this session with `sides` (n, m) as of `sides`, as it was for None."""
+        if sides is None:
+            return self
+        return self.with_views(
+            [
+                view.model_copy(update={"approached": row})
+                for view, row in zip(self.views, sides.astype(int).tolist(), strict=True)
+            ]
+        )
+
     def sides(self) -> NDArray[np.float64]:
         """Return from which side each joint came to each view's readings (n, m): +1, -1, or 0 where not known."""
         nowhere = [0] * len(self.joints)

@@ -25,7 +25,8 @@ class Solution:
     scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
     (4, 4) its base. `corrections` are what imperfect joints add to their readings, `warp` the height (m) of each
     shape of the target's, and `unused_warp` about what that would be where the data support one that nobody asked
-    for; `aspects` by how much a sensor that gives poses sees y too large.
+    for; `aspects` by how much a sensor that gives poses sees y too large. `sides` (n, m) are from which joints
+    approached their readings, as far as the fit has found that out.
     """
 
     chain: Chain
@@ -43,3 +44,4 @@ class Solution:
     warp: dict[str, float] = field(default_factory=dict)
     unused_warp: dict[str, float] = field(default_factory=dict)
     aspects: dict[str, float] = field(default_factory=dict)
+    sides: Array | None = None

@@ -61,7 +61,8 @@ def solve(
     warnings += [*left_out_in_words(solution), *unused_warp_in_words(solution.unused_warp, points)]
     warnings += observed.missing
     calibration = document(session, method, solution, Quality())
-    quality = judged(calibration, session, observed.observations, solution, warnings)
+    known = session.approached_from(solution.sides)
+    quality = judged(calibration, known, observed.observations, solution, warnings)
     corrected = corrections_in_words(calibration.corrections, session.joints, points)
     if target_warp and not solution.warp:
         corrected.append(FLAT)

@@ -1,6 +1,6 @@
 """The fit's covariance in the document's own numbers, so that every reader can carry it on."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,12 @@ Array = NDArray[np.float64]
 
 
 def document_jacobian(
-    state: State, layout: Layout, models: Sequence[str | None], corrections: Sequence[str] = ()
+    state: State, layout: Layout, models: Sequence[str | None], corrections: Mapping[str, int] | None = None
 ) -> tuple[list[str], Array]:
     """Return the dotted paths of a calibration's numbers, and their derivatives (d, p) by the parameters.
 
-    `corrections` are the paths of the readings' corrections, of the target's warp and of sensors' aspects.
+    `corrections` are the places among the parameters of the readings' corrections, of the target's warp and of sensors'
+    aspects, by path.
     """
     names: list[str] = []
     rows: list[Array] = []
@@ -51,7 +52,8 @@ def document_jacobian(
             by_lens = np.zeros((len(LENS_NAMES[model]), count))
             by_lens[:, layout.lenses[camera]] = layout.lens_changes[camera]
             add([f"cameras.{camera}.intrinsics.{path}" for path in lens_paths(model)], by_lens)
-    add(list(corrections), np.eye(count)[layout.corrections.start : layout.aspects.stop])
+    places = corrections or {}
+    add(list(places), np.eye(count)[list(places.values())])
     return names, np.array(rows)
 
 

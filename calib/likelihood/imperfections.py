@@ -7,7 +7,7 @@ plate could bulge, and a sensor see askew, as they like, so that neither is take
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,15 @@ from calib.likelihood.normal import NormalEquations, normal_equations
 from calib.likelihood.outliers import SetAside, freed_views, misfits, softened
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
 from calib.session import Session
+from calib.sweeps import SAME_START
 from calib.targets import target_points
 from calib.warp import possible_warps, warp_shapes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+FEWEST_STANDING = 3
+"""Views in a row in which a joint stands, of which its side is asked for where it is not known."""
 FEWEST_A_SIDE = 3
 """Views of a moving joint that must have come from either side: one alone may as well be wrong."""
 LEAST_TURN = np.pi / 2
@@ -61,15 +64,64 @@ class Circumstances:
 
 
 @dataclass(frozen=True)
+class Play:
+    """A joint's backlash as it is fitted: with where it stood in its play while its side was not known.
+
+    Each of `standing` are views in a row, by their places in the session. Their offsets are found along with the
+    play and not stated: after homing, for one, an idle joint may stand anywhere in it.
+    """
+
+    joint: int
+    standing: tuple[tuple[int, ...], ...]
+
+    kind: ClassVar[str] = Backlash.kind
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """The half gap, and the offsets."""
+        return (*Backlash.coefficients, *(f"standing.{views[0]}" for views in self.standing))
+
+    def regressors(self, readings: Array, sides: Array) -> Array:
+        """Return how much of each coefficient is added to the joint's readings (n, k), of the whole session."""
+        views = np.arange(len(readings))
+        return np.column_stack([sides[:, self.joint], *(np.isin(views, own) for own in self.standing)])
+
+
+Fitted = Play | OncePerTurn | Coupling
+
+
+@dataclass(frozen=True)
 class Imperfections:
     """What is corrected: readings by `models`, the target's points by the shapes `warp`.
 
     `sensors` are the cameras whose given poses have an aspect.
     """
 
-    models: tuple[Correction, ...] = ()
+    models: tuple[Fitted, ...] = ()
     warp: tuple[str, ...] = ()
     sensors: tuple[int, ...] = ()
+
+    def stated(self) -> tuple[tuple[Correction, ...], list[int]]:
+        """Return the corrections that a calibration states, and the places of their coefficients among all."""
+        models: list[Correction] = []
+        places: list[int] = []
+        first = 0
+        for model in self.models:
+            models.append(Backlash(model.joint) if isinstance(model, Play) else model)
+            places += range(first, first + len(models[-1].coefficients))
+            first += len(model.coefficients)
+        return tuple(models), places
+
+    def sides(self, about: Circumstances, coefficients: Array) -> Array:
+        """Return the sides of approach (n, m), those that were not known being the nearest to where a joint stood."""
+        sides, first = about.sides.copy(), 0
+        for model in self.models:
+            if isinstance(model, Play):
+                half_gap, *offsets = coefficients[first : first + len(model.coefficients)].tolist()
+                for views, offset in zip(model.standing, offsets, strict=True):
+                    sides[list(views), model.joint] = np.clip(np.round(offset / (half_gap or np.inf)), -1, 1)
+            first += len(model.coefficients)
+        return sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +191,15 @@ class Eliminated:
         return np.asarray(self.information[np.ix_(own, own)] - shared @ shared.T)
 
 
-def possible_corrections(problem: Problem, estimate: Estimate, about: Circumstances) -> list[Correction]:
+def possible_corrections(problem: Problem, estimate: Estimate, about: Circumstances) -> list[Fitted]:
     """Return the corrections of joints that the fit's views could show at all."""
     chain = estimate.state.chain
-    found: list[Correction] = []
+    found: list[Fitted] = []
     for joint, scale in enumerate(chain.scales):
         moving = _moving(problem, about, joint)
         sides = about.sides[moving, joint]
         if min((sides > 0).sum(), (sides < 0).sum()) >= FEWEST_A_SIDE:
-            found.append(Backlash(joint))
+            found.append(Play(joint, _standing(problem, about, joint)))
         travel = float(np.ptp(problem.readings[moving, joint])) if len(moving) else 0.0
         if chain.revolute[joint] and travel * scale > LEAST_TURN:
             found.append(OncePerTurn(joint, float(2 * np.pi / scale)))
@@ -161,6 +213,17 @@ def _moving(problem: Problem, about: Circumstances, joint: int) -> Ints:
     seen = [group.data.views for group in problem.groups if group.link > joint]
     views = np.concatenate(seen) if seen else np.zeros(0, dtype=np.intp)
     return views[np.isin(about.exercised[views], (joint, -1))]
+
+
+def _standing(problem: Problem, about: Circumstances, joint: int) -> tuple[tuple[int, ...], ...]:
+    """Return the fit's views in a row, by place, in which an idle joint stands, its side not being known."""
+    seen = np.sort(np.concatenate([group.data.views for group in problem.groups if group.link > joint]))
+    readings, open_ = problem.readings[seen, joint], about.sides[seen, joint] == 0
+    idle = open_ & ~np.isin(about.exercised[seen], (joint, -1))
+    moved = np.abs(np.diff(readings, prepend=readings[:1])) > SAME_START * np.ptp(readings)
+    runs = np.cumsum(moved | ~idle)
+    own = [seen[(runs == run) & idle] for run in np.unique(runs[idle])]
+    return tuple(tuple(views.tolist()) for views in own if len(views) >= FEWEST_STANDING)
 
 
 def with_imperfections(
@@ -275,7 +338,7 @@ def _sensors(problem: Problem) -> list[int]:
     return [group.camera for group in problem.groups if isinstance(group.data, GivenPoses)]
 
 
-def _among(model: Correction, models: Sequence[Correction]) -> bool:
+def _among(model: Fitted, models: Sequence[Fitted]) -> bool:
     """Whether there is such a correction already, be its period a little different."""
     if isinstance(model, OncePerTurn):
         return any(isinstance(m, OncePerTurn) and m.joint == model.joint for m in models)

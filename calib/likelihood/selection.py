@@ -37,6 +37,8 @@ MOST_TRIES = 3
 MOST_ROUNDS = 12
 BELONGS = float(chi2.isf(RARE, 6))
 """The squared distance beyond which a view does not belong."""
+SHARED = 3.0
+"""How many times its price a correction must gain among noisy readings: an idle joint's error is one for many views."""
 WORTH_TELLING = 0.02
 """The part of the misfit that an unused warp of the target must explain to be told of."""
 HINT = 4.0
@@ -57,41 +59,67 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
 
     `refit` fits a problem from an estimate until nothing changes.
     """
-    about, has = Circumstances.of(session), Imperfections()
-    given = np.array([joint.reading_std or 0.0 for joint in session.joints])
+    search = Search(
+        Circumstances.of(session), refit, np.array([j.reading_std or 0.0 for j in session.joints])
+    )
+    has = Imperfections()
     for _ in range(MOST_ROUNDS):
-        every = promised(fit, about, has)
-        candidates = [c for c in every if target_warp or c.imperfections.warp == has.warp]
+        every = promised(fit, search.about, has)
         price = _price(fit, len(every))
-        if weak := [kept for kept in worths(fit, has) if kept.gain <= price(kept)]:
-            fit, has = _without(fit, refit, about, has, weak[-1].imperfections), weak[-1].imperfections
+        weakest = min(worths(fit, has), key=lambda kept: kept.gain - price(kept), default=None)
+        if weakest is not None and weakest.gain <= price(weakest):
+            fit, has = search.back(fit, has, weakest.imperfections), weakest.imperfections
             continue
-        scattered = fit.problem.looseness > 0 or bool((fit.problem.reading_std != given).any())
-        for candidate in _promising(candidates, price, scattered):
-            wanted = candidate.imperfections
-            problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, about, has, wanted)
-            try:
-                trial = refit(replace(problem, reading_std=given, looseness=0.0), _as_read(estimate))
-            except UnsolvableError:
-                continue
-            worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
-            if min([gained(fit, trial), *worth]) <= price(candidate):
-                continue
-            # It may be the way there that gained: then it is open without the correction, too.
-            plain = _without(trial, refit, about, wanted, has)
-            fit, has = (trial, wanted) if gained(plain, trial) > price(candidate) else (plain, has)
+        candidates = [c for c in every if target_warp or c.imperfections.warp == has.warp]
+        tries = _promising(candidates, price, search.scattered(fit), has)
+        found = (search.forward(fit, has, candidate, price(candidate)) for candidate in tries)
+        better = next((one for one in found if one is not None), None)
+        if better is None:
             break
-        else:
-            break
+        fit, has = better
     worth_telling = WORTH_TELLING * count_measurements(fit.problem, fit.weights)
     bulges = [c for c in every if c.imperfections.warp != has.warp and c.gain > max(price(c), worth_telling)]
     best = max(bulges, key=lambda c: c.gain - price(c), default=None)
     return Selected(fit, has, None if target_warp else best)
 
 
-def _without(fit: Fit, refit: Refit, about: Circumstances, has: Imperfections, wanted: Imperfections) -> Fit:
-    """Return the fit with less than it `has`, from where it is."""
-    return refit(*with_imperfections(fit.problem, fit.descent.estimate, about, has, wanted))
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Steps from a fit to one with more or less corrected; `given` (m,) is the noise of readings that was said."""
+
+    about: Circumstances
+    refit: Refit
+    given: Array
+
+    def scattered(self, fit: Fit) -> bool:
+        """Whether the fit takes for scatter what a correction may explain."""
+        return fit.problem.looseness > 0 or bool((fit.problem.reading_std != self.given).any())
+
+    def forward(
+        self, fit: Fit, has: Imperfections, candidate: Candidate, price: float
+    ) -> tuple[Fit, Imperfections] | None:
+        """Return the fit with the candidate's corrections if they gain more than their price, and what it has.
+
+        None where nothing is better than before.
+        """
+        wanted = candidate.imperfections
+        problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted)
+        try:
+            trial = self.refit(replace(problem, reading_std=self.given, looseness=0.0), _as_read(estimate))
+        except UnsolvableError:
+            return None
+        if (trial.problem.reading_std > 0).any():
+            price *= SHARED
+        worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
+        if min([gained(fit, trial), *worth]) <= price:
+            return None
+        # It may be the way there that gained: then it is open without the correction, too.
+        plain = self.back(trial, wanted, has)
+        return (trial, wanted) if gained(plain, trial) > price else (plain, has)
+
+    def back(self, fit: Fit, has: Imperfections, wanted: Imperfections) -> Fit:
+        """Return the fit with less than it `has`, from where it is."""
+        return self.refit(*with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted))
 
 
 def _price(fit: Fit, candidates: int) -> Callable[[Candidate], float]:
@@ -101,11 +129,20 @@ def _price(fit: Fit, candidates: int) -> Callable[[Candidate], float]:
 
 
 def _promising(
-    candidates: list[Candidate], price: Callable[[Candidate], float], scattered: bool
+    candidates: list[Candidate], price: Callable[[Candidate], float], scattered: bool, has: Imperfections
 ) -> list[Candidate]:
-    """Return the candidates that promise enough to be fitted, where views count as `scattered` or not."""
+    """Return the candidates that promise enough to be fitted, where views count as `scattered` or not.
+
+    Of several errors, each that remains is scatter enough to hide the others: then they are tried together, too.
+    """
     enough = [c for c in candidates if c.gain > (HINT * c.size if scattered else price(c) / 2)]
-    return sorted(enough, key=lambda c: price(c) - c.gain)[:MOST_TRIES]
+    best = sorted(enough, key=lambda c: price(c) - c.gain)[:MOST_TRIES]
+    joints = [c for c in best if len(c.imperfections.models) > len(has.models)]
+    if not scattered or len(joints) < 2:
+        return best
+    models = tuple(c.imperfections.models[-1] for c in joints)
+    together = replace(has, models=(*has.models, *models))
+    return [*best, Candidate(together, sum(c.size for c in joints), sum(c.gain for c in joints))]
 
 
 def _as_read(estimate: Estimate) -> Estimate:

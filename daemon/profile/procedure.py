@@ -95,6 +95,9 @@ def _sweep(table: SweepTable, path: KeyPath, specs: Mapping[str, AxisSpec], prob
         problems.add(given[-1][0], "a reading stands twice: a sweep takes each position once")
     if table.positions is not None:
         values = _evenly_spaced(values[0], values[1], table.positions)
+    if table.both_ways:
+        # The last position has no other side to come from without going beyond it.
+        values = [*values, *reversed(values[:-1])]
     # The joint itself need not be told where to start: its first reading is the natural place.
     start = _readings(table.start, (*path, "start"), specs, problems, {table.joint: values[0]})
     return Sweep(table.joint, start, tuple(values), table.use)

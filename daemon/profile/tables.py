@@ -118,6 +118,9 @@ class SweepTable(Table):
     last: Annotated[Reading | None, Field(alias="to")] = None
     positions: Annotated[int | None, Field(ge=2, le=10_000)] = None
     readings: Annotated[list[Reading] | None, Field(min_length=2, max_length=10_000)] = None
+    both_ways: Annotated[
+        bool, Field(description="Take the positions once more on the way back: that shows backlash.")
+    ] = False
     use: Use = "fit"
 
     @model_validator(mode="after")

@@ -1,5 +1,6 @@
 """The profile's `[simulation]` table: what the simulated world is truly like. No other room may know."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, FiniteFloat, model_validator
@@ -67,6 +68,8 @@ class JointOptions(DriverOptions):
     """Standard deviation of one reading."""
     settling: SettlingOptions | None = None
     eccentricity: EccentricityOptions | None = None
+    coupling: Mapping[str, FiniteFloat] = Field(default_factory=dict)
+    """Of other axes, by name: what part of their own displacements is added to this one's (rad or m each)."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

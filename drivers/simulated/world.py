@@ -48,6 +48,7 @@ class SimulatedWorld:
             spec.name: Shaft(Gear.from_options(joint, spec))
             for joint, spec in zip(options.joints, axes, strict=True)
         }
+        self._coupled = self._couplings()
         self._carrying = self._joints_below_camera()
         self._camera = self._camera_at_zero()
 
@@ -61,11 +62,14 @@ class SimulatedWorld:
         """Return the true displacements (n,) that belong to readings (n,): free of play, swing and noise."""
         values = self._vector(readings)
         gears = [shaft.gear for shaft in self._shafts.values()]
-        return np.array([gear.displacement(float(value)) for gear, value in zip(gears, values, strict=True)])
+        own = [gear.displacement(float(value)) for gear, value in zip(gears, values, strict=True)]
+        displacements: Array = self._coupled @ own
+        return displacements
 
     def true_displacements(self, t: float) -> Array:
         """Return where the joints (n,) truly are at the clock's time `t`."""
-        return np.array([shaft.displacement(t) for shaft in self._shafts.values()])
+        displacements: Array = self._coupled @ [shaft.displacement(t) for shaft in self._shafts.values()]
+        return displacements
 
     def world_from_camera(self, readings: ArrayLike) -> Array:
         """Return the camera's true pose (4, 4) at readings (n,)."""
@@ -103,6 +107,19 @@ class SimulatedWorld:
             wanted = ", ".join(f"{spec.name} ({spec.unit})" for spec in self._axes)
             raise ValueError(f"readings must be one finite number for each axis: {wanted}")
         return values
+
+    def _couplings(self) -> Array:
+        """Return what each joint's own displacement moves each joint by (n, n)."""
+        names = list(self._shafts)
+        coupled = np.eye(len(names))
+        for index, (name, joint) in enumerate(zip(names, self.options.joints, strict=True)):
+            for other, part in joint.coupling.items():
+                if other not in names or other == name:
+                    raise OptionsError(
+                        f"axis '{name}' is coupled to '{other}': choose another one of {', '.join(names)}"
+                    )
+                coupled[index, names.index(other)] = part
+        return coupled
 
     def _joints_below_camera(self) -> int:
         names = [spec.name for spec in self._axes]

@@ -46,6 +46,24 @@ def test_zero_is_added_to_the_reading() -> None:
     )
 
 
+def test_a_coupled_joint_moves_along() -> None:
+    coupled = rigs.world(CLOCK, pan={"coupling": {"slide": 0.5}})
+    # Half a radian of pan for each metre of the slide.
+    turned = rigs.world(CLOCK).world_from_camera([30.0, 7.0 + math.degrees(0.5 * 0.03)])
+    assert np.allclose(coupled.world_from_camera([30.0, 7.0]), turned, atol=1e-12)
+    assert np.array_equal(
+        coupled.world_from_camera([0.0, 7.0]), rigs.world(CLOCK).world_from_camera([0.0, 7.0])
+    )
+
+
+@pytest.mark.parametrize("other", ["pan", "tilt"])
+def test_a_joint_is_coupled_to_another_one_of_the_rig(other: str) -> None:
+    with pytest.raises(
+        OptionsError, match=f"axis 'pan' is coupled to '{other}': choose another one of slide, pan"
+    ):
+        rigs.world(CLOCK, pan={"coupling": {other: 0.5}})
+
+
 def test_a_camera_on_an_earlier_link_ignores_what_it_does_not_ride_on() -> None:
     world = rigs.world(CLOCK, link="slide")
     assert np.array_equal(world.world_from_camera([30.0, 0.0]), world.world_from_camera([30.0, 15.0]))

@@ -82,6 +82,11 @@ def test_a_sweep_may_go_downwards(load: Load) -> None:
     assert dict(slide.start) == {"slide": 1000.0, "pan": 0.0}
 
 
+def test_a_sweep_may_come_back_the_other_way(load: Load) -> None:
+    slide, _ = load(("positions = 11", "positions = 3\nboth_ways = true")).procedure.sweeps
+    assert slide.readings == (0.0, 500.0, 1000.0, 500.0, 0.0)
+
+
 def test_a_start_is_completed_in_chain_order(load: Load) -> None:
     profile = load()
     slide, pan = profile.procedure.sweeps
