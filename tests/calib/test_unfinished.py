@@ -6,6 +6,7 @@ import pytest
 from calib import solve
 from calib.errors import UnsolvableError
 from calib.session import Session
+from calib.unfinished import finished_part
 from tests.calib.rigs import pose_session, random_rig
 
 RIG = random_rig(np.random.default_rng(11), ["prismatic", "revolute"], ["skew"])
@@ -24,6 +25,14 @@ def test_the_finished_joint_is_solved(count: int) -> None:
     assert "joint 'j1' was not exercised and counts as fixed" in calibration.quality.warnings[0]
     predicted = calibration.world_from_camera([0.7 / RIG.scales[0]])
     assert np.allclose(predicted, RIG.pose(np.array([0.7, 0.2]) / RIG.scales), atol=1e-8)
+
+
+def test_the_sides_of_the_joints_that_remain_are_kept() -> None:
+    session = cut_off(6)
+    views = [view.model_copy(update={"approached": [1, -1]}) for view in session.views]
+    kept, _ = finished_part(session.with_views(views))
+    assert [view.approached for view in kept.views] == [[1]] * 6
+    assert [view.approached for view in finished_part(session)[0].views] == [None] * 6
 
 
 def test_all_joints_once_they_are_begun() -> None:
