@@ -21,8 +21,9 @@ from benchmarks.printing import console, say, table
 from benchmarks.true_rig import Array
 from calib import Calibration, Session, load_session, solve, verify
 from calib.first_solution import camera_views
+from calib.lens import project_points
 from calib.observations import observe
-from calib.residuals import misfits
+from calib.targets import target_points
 from calib.transforms import pose_error
 from daemon.profile import load_profile
 
@@ -176,8 +177,11 @@ def _points_rms(session: Session, held: Sequence[int], poses: Array) -> float:
     observed = observe(session).observations
     lens = camera_views(session, [o for o in observed if o.view not in held]).lenses[0]
     assert lens is not None
-    pixels = misfits([o for o in observed if o.view in held], session.target, lens, poses)
-    return float(np.sqrt((np.concatenate(pixels) ** 2).sum(axis=1).mean()))
+    world, away = target_points(session.target), []
+    for pose, seen in zip(poses, [o for o in observed if o.view in held], strict=True):
+        points = (world[seen.ids] - pose[:3, 3]) @ pose[:3, :3]
+        away.append(project_points(points, lens) - seen.pixels)
+    return float(np.sqrt((np.concatenate(away) ** 2).sum(axis=1).mean()))
 
 
 def _on_positioner() -> dict[str, float]:
