@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.lens_prior import LensPrior
-from calib.likelihood.blocks import Blocks, disk_offsets, point_blocks
+from calib.likelihood.blocks import Blocks, disk_offsets, out_of_date, point_blocks
 from calib.likelihood.lens_terms import lens_from_vector, lens_vector
 from calib.likelihood.measurements import PointViews
 from calib.session import Intrinsics
@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 MOST_STEPS = 50
 CONVERGED = 1e-3
 """What a further step would gain, in units of one measurement's mean cost, below which it is not taken."""
-HELD_PX = 1e-4
-"""By how much what centroids of disks are off by may be out of date."""
+FAR = 100.0
+"""What a step promises, in the same units, from which on what centroids of disks are off by is asked anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +49,21 @@ def adjust(
         noise = float(blocks.cost.sum()) / freedom
         step, twists, gain = _step(blocks, values, prior, noise, damping)
         moved = poses @ exp_twist(twists), values + step
-        there = _blocks(seen, *moved, lens, offsets)
+        renewed = offsets
+        if gain > FAR * noise:
+            renewed = disk_offsets(seen, moved[0], lens_from_vector(moved[1], lens), disk_diameter)
+        there = _blocks(seen, *moved, lens, renewed)
         cost = there.cost.sum() + noise * prior.misfit(moved[1])
         if not cost <= blocks.cost.sum() + noise * prior.misfit(values):
             damping, growth = damping * growth, growth * 2
             if damping > 1e12:
                 break
             continue
-        (poses, values), blocks = moved, there
+        (poses, values), blocks, offsets = moved, there, renewed
         damping, growth = max(damping / 10, 1e-12), 4.0
         if gain <= CONVERGED * cost / freedom:
             renewed = disk_offsets(seen, poses, lens_from_vector(values, lens), disk_diameter)
-            if np.nanmax(np.abs(renewed - offsets), initial=0) < HELD_PX:
+            if out_of_date(seen, offsets, renewed) <= CONVERGED * noise:
                 break
             offsets = renewed
             blocks = _blocks(seen, poses, values, lens, offsets)

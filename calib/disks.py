@@ -29,13 +29,13 @@ def centroid_offsets(centres: Array, camera_from_world: Array, diameter: float, 
     rim = diameter / 2 * np.stack([np.cos(angles), np.sin(angles)])
     rotation, translation = camera_from_world[..., :3, :3], camera_from_world[..., None, :3, 3]
     placed = centres @ np.swapaxes(rotation, -1, -2) + translation
-    across = np.moveaxis(rotation[..., :2] @ rim, -1, 0)
-    middle = project_points(placed, lens)
-    x, y = np.moveaxis(project_points(placed + across[..., None, :], lens) - middle, -1, 0)
+    across, middle = rotation[..., :2] @ rim, project_points(placed, lens)
+    seen = [project_points(placed + across[..., None, :, k], lens) - middle for k in range(RIM_POINTS)]
+    x, y = np.stack([points[..., 0] for points in seen]), np.stack([points[..., 1] for points in seen])
     # Green's theorem over the rim; derivatives by the sampled rim's own Fourier series.
     dx, dy = np.tensordot(FOURIER_DERIVATIVE, x, 1), np.tensordot(FOURIER_DERIVATIVE, y, 1)
-    area = (x * dy - y * dx).sum(axis=0)
-    moments = [(x * x * dy).sum(axis=0), -(y * y * dx).sum(axis=0)]
+    area = 2 * np.einsum("k...,k...->...", x, dy)
+    moments = [np.einsum("k...,k...,k...->...", x, x, dy), -np.einsum("k...,k...,k...->...", y, y, dx)]
     return np.asarray(np.stack(moments, axis=-1) / area[..., None])
 
 

@@ -143,18 +143,23 @@ def disk_offsets(seen: PointViews, poses: Array, lens: Intrinsics, diameter: flo
     return offsets
 
 
-def rescaled(blocks: Blocks, size: Array) -> Blocks:
-    """Return blocks in which everything counts, with residuals in units of `size`, of each row (r,) or of all ()."""
-    flat = blocks.residuals.reshape(len(blocks.residuals), -1) / size
-    transposed = np.swapaxes(blocks.jacobian, 1, 2) / size
-    return _blocks(flat.reshape(blocks.residuals.shape), flat, transposed)
+def out_of_date(seen: PointViews, held: Array, renewed: Array) -> float:
+    """Return what renewing offsets (n, q, 2) can gain at most: how far they moved in units of noise, squared."""
+    return float(np.nansum((seen.whitening @ (renewed - held)[..., None]) ** 2))
 
 
-def weighed(blocks: Blocks, weights: Array) -> Blocks:
-    """Return blocks in which everything counts with the `weights` (n, q) of points, or (n, 6) of given poses."""
+def said_of_poses(blocks: Blocks, weights: Array) -> tuple[Array, Array]:
+    """Return the information (n, 6, 6) and gradient (n, 6) of poses, from blocks in which everything counts.
+
+    `weights` are (n, q) of points, or (n, 6) of given poses.
+    """
     flat = blocks.residuals.reshape(len(weights), -1)
     root = np.repeat(np.sqrt(weights), flat.shape[1] // weights.shape[1], axis=1)
-    return _blocks(blocks.residuals, flat * root, np.swapaxes(blocks.jacobian, 1, 2) * root[:, None])
+    # What is set aside may be anything, even behind the camera.
+    flat = np.where(root > 0, flat * root, 0.0)
+    jacobian = np.swapaxes(blocks.jacobian[:, :, :6], 1, 2)
+    jacobian = np.where(root[:, None] > 0, jacobian * root[:, None], 0.0)
+    return jacobian @ np.swapaxes(jacobian, 1, 2), (jacobian @ flat[..., None])[..., 0]
 
 
 def _whiten(rows: Array, whitening: Array) -> None:

@@ -1,11 +1,13 @@
 """Levenberg and Marquardt's way down, which never returns a worse likelihood than it started from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.errors import UnsolvableError
+from calib.likelihood.blocks import out_of_date
 from calib.likelihood.measurements import PointViews
 from calib.likelihood.normal import NormalEquations, normal_equations
 from calib.likelihood.problem import Estimate, Evaluation, Problem, Weights, evaluate, offsets_at
@@ -17,11 +19,13 @@ MOST_STEPS = 1000
 MOST_ROUNDS = 5
 CONVERGED = 1e-3
 """What a step gains in twice the log-likelihood below which a round is over: the next one gains far less."""
-NOTHING = 1e-6
-"""What a step must promise to be taken at all: a thousandth of a standard deviation."""
+NOTHING = 1e-5
+"""What a step must promise to be taken at all: a few thousandths of a standard deviation."""
 MOST_DAMPING = 1e12
-HELD_PX = 1e-4
-"""By how much what centroids of disks are off by may be out of date."""
+FAR = 10.0
+"""What a step promises from which on it is worth the while to ask anew what centroids of disks are off by."""
+OUT_OF_DATE = 1e-4
+"""What doing so may gain at the end: a hundredth of a standard deviation."""
 UNTOLD = 1e-24
 """Part of the largest information of a parameter that is no more than rounding."""
 
@@ -49,15 +53,20 @@ def descend(problem: Problem, start: Estimate, weights: Weights) -> Descent:
         )
     descent = _round(problem, start, weights)
     for _ in range(MOST_ROUNDS):
-        held, renewed = descent.estimate.offsets, offsets_at(problem, descent.estimate)
-        if all(_close(old, new) for old, new in zip(held, renewed, strict=True)):
+        renewed = offsets_at(problem, descent.estimate)
+        if _out_of_date(problem, descent.estimate.offsets, renewed) <= OUT_OF_DATE:
             break
         descent = _round(problem, replace(descent.estimate, offsets=renewed), weights)
     return descent
 
 
-def _close(old: Array | None, new: Array | None) -> bool:
-    return old is None or new is None or bool(np.nanmax(np.abs(old - new), initial=0) < HELD_PX)
+def _out_of_date(problem: Problem, held: Sequence[Array | None], renewed: Sequence[Array | None]) -> float:
+    """Return what renewing offsets can gain at most in twice the log-likelihood."""
+    return sum(
+        out_of_date(group.data, old, new)
+        for group, old, new in zip(problem.groups, held, renewed, strict=True)
+        if isinstance(group.data, PointViews) and old is not None and new is not None
+    )
 
 
 def _round(problem: Problem, estimate: Estimate, weights: Weights) -> Descent:
@@ -70,6 +79,8 @@ def _round(problem: Problem, estimate: Estimate, weights: Weights) -> Descent:
         if gain <= NOTHING or damping > MOST_DAMPING:
             return Descent(estimate, evaluation, equations, converged=True)
         candidate = stepped(problem, estimate, equations, step)
+        if gain > FAR:
+            candidate = replace(candidate, offsets=offsets_at(problem, candidate))
         there = evaluate(problem, candidate, weights)
         if not there.cost <= evaluation.cost:
             damping, growth = damping * growth, growth * 2

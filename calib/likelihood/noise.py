@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.likelihood.blocks import rescaled, weighed
+from calib.likelihood.blocks import said_of_poses
 from calib.likelihood.measurements import PointViews
-from calib.likelihood.outliers import Freed, Misfits, freed_views, misfits, point_noise
-from calib.likelihood.problem import Estimate, Evaluation, GroupTerms, Problem, Weights, all_in, evaluate
+from calib.likelihood.outliers import Freed, Given, Misfits, freed_views, misfits, point_noise
+from calib.likelihood.problem import Estimate, GroupTerms, Problem, Weights, all_in, evaluate
 from calib.likelihood.scatter import PoseMisfit, Scatter, estimated_scatter
 
 Array = NDArray[np.float64]
@@ -33,39 +33,37 @@ def seen_noise(
     views is asked for where it is said of which joints (m,) the readings' noise is `unknown`.
     """
     as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
-    everything = all_in(problem)
-    there = evaluate(problem, estimate, everything)
-    read = evaluate(problem, as_read, everything) if estimate.reading_errors.any() else there
+    read = evaluate(problem, as_read, all_in(problem))
     freed = freed_views(problem, read.terms)
-    sizes = _sizes(problem, there, freed, weights)
+    sizes = _sizes(problem, estimate, freed, weights)
     groups = [
         replace(group, data=replace(group.data, whitening=group.data.whitening / size[..., None]))
         for group, size in zip(problem.groups, sizes, strict=True)
     ]
     scaled = replace(problem, groups=tuple(groups))
-    terms = [
-        replace(own, blocks=rescaled(own.blocks, size)) for own, size in zip(read.terms, sizes, strict=True)
-    ]
-    freed = [view and view.rescaled(float(size)) for view, size in zip(freed, sizes, strict=True)]
     if unknown is not None:
-        scatter = _scatter(scaled, terms, weights, unknown)
+        scatter = _scatter(scaled, read.terms, sizes, weights, unknown)
         scaled = replace(scaled, reading_std=scatter.readings, looseness=scatter.looseness)
-    found = misfits(scaled, terms, freed, weights, covariance)
+    freed = [view.rescaled(size) for view, size in zip(freed, sizes, strict=True)]
+    found = misfits(scaled, read.terms, freed, weights, covariance)
     return scaled, found, _much_the_same(problem, scaled)
 
 
 def _sizes(
-    problem: Problem, there: Evaluation, freed: Sequence[Freed | None], weights: Weights
+    problem: Problem, estimate: Estimate, freed: Sequence[Freed | Given], weights: Weights
 ) -> list[Array]:
     """Return each group's standard deviations of whitened measurements: one of points (), six of given poses (6,)."""
+    if any(isinstance(view, Given) for view in freed) and estimate.reading_errors.any():
+        # The noise of poses is what is left when the readings have taken their share.
+        freed = freed_views(problem, evaluate(problem, estimate, all_in(problem)).terms)
     spent, sizes = int(problem.free.sum()), []
-    for group, terms, view, weight in zip(problem.groups, there.terms, freed, weights.groups, strict=True):
+    for group, view, weight in zip(problem.groups, freed, weights.groups, strict=True):
         if isinstance(group.data, PointViews):
-            assert view is not None
             sizes.append(np.array(point_noise(view.left, group.data.present)))
         else:
+            assert isinstance(view, Given)
             least = LEAST_POSE_NOISE * np.diag(group.data.whitening)
-            sizes.append(np.hypot(_pose_sizes(terms.blocks.residuals[..., 0], weight, spent), least))
+            sizes.append(np.hypot(_pose_sizes(view.residuals, weight, spent), least))
     return sizes
 
 
@@ -80,16 +78,24 @@ def _pose_sizes(residuals: Array, weight: Array, spent: int) -> Array:
 
 
 def _scatter(
-    problem: Problem, terms: Sequence[GroupTerms], weights: Weights, unknown: NDArray[np.bool_]
+    problem: Problem,
+    terms: Sequence[GroupTerms],
+    sizes: Sequence[Array],
+    weights: Weights,
+    unknown: NDArray[np.bool_],
 ) -> Scatter:
-    """Return what scatters the views; in `terms` everything counts and readings are taken as they were read."""
+    """Return what scatters the views, measurements being as noisy as `sizes` say.
+
+    In `terms` everything counts and readings are taken as they were read.
+    """
     misfits = []
-    for group, own, weight in zip(problem.groups, terms, weights.groups, strict=True):
-        kept, blocks = weight.any(axis=1), weighed(own.blocks, weight)
+    for group, own, size, weight in zip(problem.groups, terms, sizes, weights.groups, strict=True):
+        kept = weight.any(axis=1)
+        information, gradient = said_of_poses(own.blocks, weight / size**2)
         misfits.append(
             PoseMisfit(
-                information=blocks.hessian[kept, :6, :6],
-                gradient=blocks.gradient[kept, :6],
+                information=information[kept],
+                gradient=gradient[kept],
                 by_reading=own.chain.by_reading[kept],
                 loose=isinstance(group.data, PointViews),
             )

@@ -54,15 +54,50 @@ class Freed:
     information: Array
     left: Array
 
-    def rescaled(self, size: float) -> "Freed":
+    def rescaled(self, size: Array) -> "Freed":
         """Return the same with misfits in units of `size`."""
         return Freed(self.shift, self.information / size**2, self.left / size**2)
 
-    def distance(self, scatter: Array, looseness: float) -> Array:
-        """Return the squared distances (n, 1) in units of their loosened noise and `scatter` (n, 6, 6)."""
-        covariance = (1 + looseness) * np.linalg.inv(self.information) + scatter
+    def loosened(self, looseness: float) -> "Freed":
+        """Return the same with poses that may be off at random: by `looseness` times their own covariance."""
+        return replace(self, information=self.information / (1 + looseness))
+
+    def distance(self, scatter: Array) -> Array:
+        """Return the squared distances (n, 1) in units of their noise, the views scattered besides (n, 6, 6)."""
+        covariance = np.linalg.inv(self.information) + scatter
         reach = np.linalg.solve(covariance, self.shift[..., None])[..., 0]
         return np.asarray((self.shift * reach).sum(axis=1, keepdims=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Given poses, beside which nothing could be bad: their whitened `residuals` (n, 6), with `jacobian` (n, 6, 6)."""
+
+    residuals: Array
+    jacobian: Array
+
+    @classmethod
+    def of(cls, blocks: Blocks) -> "Given":
+        """Return the poses of these blocks."""
+        return cls(blocks.residuals[..., 0], blocks.jacobian[:, :, :6])
+
+    @property
+    def left(self) -> Array:
+        """The squared misfits of points, of which there are none (n, 0)."""
+        return np.zeros((len(self.residuals), 0))
+
+    def rescaled(self, size: Array) -> "Given":
+        """Return the same with residuals in units of `size` (6,)."""
+        return Given(self.residuals / size, self.jacobian / size[:, None])
+
+    def distance(self, scatter: Array) -> Array:
+        """Return the squared misfits (n, 2) of rotations and positions, the views scattered besides (n, 6, 6)."""
+        covariance = np.eye(6) + self.jacobian @ scatter @ np.swapaxes(self.jacobian, 1, 2)
+        parts = []
+        for part in (slice(0, 3), slice(3, 6)):
+            reach = np.linalg.solve(covariance[:, part, part], self.residuals[:, part, None])[..., 0]
+            parts.append((self.residuals[:, part] * reach).sum(axis=1))
+        return np.column_stack(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +114,10 @@ class Misfits:
     spread: float
 
 
-def freed_views(problem: Problem, terms: Sequence[GroupTerms]) -> list[Freed | None]:
-    """Return each group's views with their poses freed; in the groups' terms everything counts.
-
-    Given poses have nothing beside them that could be bad: None.
-    """
+def freed_views(problem: Problem, terms: Sequence[GroupTerms]) -> list[Freed | Given]:
+    """Return each group's views with their poses freed from their points; in the groups' terms everything counts."""
     return [
-        _freed(own.blocks, group.data.present) if isinstance(group.data, PointViews) else None
+        _freed(own.blocks, group.data.present) if isinstance(group.data, PointViews) else Given.of(own.blocks)
         for group, own in zip(problem.groups, terms, strict=True)
     ]
 
@@ -93,14 +125,13 @@ def freed_views(problem: Problem, terms: Sequence[GroupTerms]) -> list[Freed | N
 def misfits(
     problem: Problem,
     terms: Sequence[GroupTerms],
-    freed: Sequence[Freed | None],
+    freed: Sequence[Freed | Given],
     weights: Weights,
     covariance: Array,
 ) -> Misfits:
-    """Return the misfits; in the groups' `terms` everything counts and readings are taken as they were read.
+    """Return the misfits of views `freed` as of `freed_views`, at `terms` where readings are taken as they were read.
 
-    `freed` are the groups' views as of `freed_views`. A view that `weights` leave out is predicted by a fit that knows
-    nothing of it: `covariance` (p, p) says how well.
+    A view that `weights` leave out is predicted by a fit that knows nothing of it: `covariance` (p, p) says how well.
     """
     distances, lefts, typical, typical_point = [], [], [], []
     for own, view, present, weight in zip(terms, freed, all_in(problem).groups, weights.groups, strict=True):
@@ -109,13 +140,13 @@ def misfits(
         out = ~weight.any(axis=1)
         unseen = own.chain.by_parameter[out]
         scatter[out] += unseen @ covariance @ np.swapaxes(unseen, 1, 2)
-        if view is not None:
-            distance, left = view.distance(scatter, problem.looseness), view.left
-            typical_point.append(left[present > 0])
+        if isinstance(view, Freed):
+            distance = view.loosened(problem.looseness).distance(scatter)
+            typical_point.append(view.left[present > 0])
         else:
-            distance, left = given_distances(own.blocks, scatter), np.zeros((len(weight), 0))
+            distance = view.distance(scatter)
         distances.append(np.nan_to_num(distance, nan=np.inf))
-        lefts.append(left)
+        lefts.append(view.left)
         typical.append(distances[-1].ravel() / MEDIAN[_freedom(distance)])
     # Whitened misfits are about 1, and far less only where the measurements are exact to rounding.
     median = float(np.nanmedian(np.concatenate(typical_point))) / MEDIAN[2] if typical_point else 0.0
@@ -128,17 +159,6 @@ def misfits(
 def _freedom(distances: Array) -> int:
     """Return of how many numbers each of the distances (n, 1) or (n, 2) is made: a pose has six."""
     return 6 // int(distances.shape[1])
-
-
-def given_distances(blocks: Blocks, scatter: Array) -> Array:
-    """Return the squared misfits (n, 2) of given poses' rotations and positions, their views scattered (n, 6, 6)."""
-    jacobian, misfit = blocks.jacobian[:, :, :6], blocks.residuals[..., 0]
-    covariance = np.eye(6) + jacobian @ scatter @ np.swapaxes(jacobian, 1, 2)
-    parts = []
-    for part in (slice(0, 3), slice(3, 6)):
-        reach = np.linalg.solve(covariance[:, part, part], misfit[:, part, None])[..., 0]
-        parts.append((misfit[:, part] * reach).sum(axis=1))
-    return np.column_stack(parts)
 
 
 def without_bad_points(problem: Problem, found: Misfits) -> Weights:

@@ -26,7 +26,7 @@ from calib.likelihood.imperfections import (
     worths,
 )
 from calib.likelihood.measurements import PointViews
-from calib.likelihood.outliers import RARE, STUDENT, given_distances
+from calib.likelihood.outliers import RARE, STUDENT, Given
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
 from calib.session import Session
 
@@ -191,7 +191,7 @@ def _deviance(problem: Problem, fit: Fit, weights: Weights) -> float:
             distance = away - (pull * np.linalg.solve(noise, pull[..., None])[..., 0]).sum(axis=1)
             cost = terms.blocks.cost - loose * away + np.minimum(distance, BELONGS) + 6 * np.log(loose)
         else:
-            parts = given_distances(terms.blocks, spread @ transposed)
+            parts = Given.of(terms.blocks).distance(spread @ transposed)
             cost = ((STUDENT + 3) * np.log1p(parts / STUDENT)).sum(axis=1)
         total += float((cost + np.linalg.slogdet(noise)[1]).sum())
     return total
