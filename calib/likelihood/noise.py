@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 LEAST_POSE_NOISE = 1e-9
 """In rad and m: given poses may be exact to rounding."""
+FEWEST_POINTS = 4
+"""Points that a view must have kept to say where its camera was."""
 SETTLED = 0.02
 """Relative change of a standard deviation that no longer matters."""
 
@@ -90,14 +92,15 @@ def _scatter(
     """
     misfits = []
     for group, own, size, weight in zip(problem.groups, terms, sizes, weights.groups, strict=True):
-        kept = weight.any(axis=1)
+        points = isinstance(group.data, PointViews)
+        kept = (weight > 0).sum(axis=1) >= (FEWEST_POINTS if points else 1)
         information, gradient = said_of_poses(own.blocks, weight / size**2)
         misfits.append(
             PoseMisfit(
                 information=information[kept],
                 gradient=gradient[kept],
                 by_reading=own.chain.by_reading[kept],
-                loose=isinstance(group.data, PointViews),
+                loose=points,
             )
         )
     return estimated_scatter(misfits, problem.reading_std, unknown)
