@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from calib.advice import weakness_in_words
 from calib.calibration import Calibration, Quality
+from calib.corrections_in_words import FLAT, corrections_in_words, unused_warp_in_words
 from calib.document import Method, document
 from calib.errors import UnsolvableError
 from calib.first_solution import CameraViews, camera_views, first_solution
@@ -15,7 +16,6 @@ from calib.parameters import Held
 from calib.quality import judged
 from calib.session import Session
 from calib.solution import Solution
-from calib.stated_corrections import FLAT, corrections_in_words, unused_warp_in_words
 from calib.targets import target_points
 from calib.unfinished import finished_part
 

@@ -12,7 +12,8 @@
     descent              Levenberg and Marquardt's way down
     outliers             what does not belong
     noise                how noisy points and poses are;  scatter  what else scatters the views
-    imperfections        what joints and target may be off by, and what knowing it would gain;  selection  what is kept
+    imperfections        what joints, target and sensor may be off by;  promises  what knowing it would gain
+    selection            which of that the data support
     refinement           all of it in turn, until nothing changes
     uncertainty          the covariance;  document_covariance  in the document's own numbers
     quantities           what a person asks about;  weakness  what of it the views do not tell

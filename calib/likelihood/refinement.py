@@ -10,7 +10,7 @@ from calib.likelihood.building import Start, built
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
 from calib.likelihood.idle import as_the_views_follow
-from calib.likelihood.imperfections import Candidate, Fit, Imperfections
+from calib.likelihood.imperfections import Imperfections
 from calib.likelihood.lens_terms import lens_from_vector
 from calib.likelihood.noise import seen_noise
 from calib.likelihood.outliers import (
@@ -26,6 +26,7 @@ from calib.likelihood.problem import (
     all_in,
     evaluate,
 )
+from calib.likelihood.promises import Candidate, Fit
 from calib.likelihood.selection import selected
 from calib.likelihood.state import State
 from calib.likelihood.uncertainty import noise_variance, step_covariance

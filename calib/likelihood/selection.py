@@ -16,18 +16,11 @@ from scipy.stats import chi2
 
 from calib.errors import UnsolvableError
 from calib.likelihood.descent import count_measurements
-from calib.likelihood.imperfections import (
-    Candidate,
-    Circumstances,
-    Fit,
-    Imperfections,
-    promised,
-    with_imperfections,
-    worths,
-)
+from calib.likelihood.imperfections import Circumstances, Imperfections, with_imperfections
 from calib.likelihood.measurements import PointViews
 from calib.likelihood.outliers import RARE, STUDENT, Given
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
+from calib.likelihood.promises import Candidate, Fit, promised, worths
 from calib.session import Session
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ import pytest
 from benchmarks import random_rigs
 from benchmarks.random_rigs import looking_rig, noisy_session
 from calib import solve, verify
+from calib.corrections_in_words import FLAT
 from calib.session import Session
-from calib.stated_corrections import FLAT
 from calib.targets import Chessboard, CircleGrid, target_points
 from calib.warp import WARPS, possible_warps, warp_shapes
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calib import Calibration, load_calibration, save_calibration
-from calib.stated_corrections import FLAT
+from calib.corrections_in_words import FLAT
 from daemon.cli.main import main
 from tests.calib.scenes import DISK_CENTRES, DISKS, plan, points_session, two_axis_rig
 
