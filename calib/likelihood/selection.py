@@ -61,7 +61,10 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
         price = _price(fit, len(every))
         weakest = min(worths(fit, has), key=lambda kept: kept.gain - price(kept), default=None)
         if weakest is not None and weakest.gain <= price(weakest):
-            fit, has = search.back(fit, has, weakest.imperfections), weakest.imperfections
+            less = search.back(fit, has, weakest.imperfections)
+            if less is None:
+                break
+            fit, has = less, weakest.imperfections
             continue
         candidates = [c for c in every if target_warp or c.imperfections.warp == has.warp]
         tries = _promising(candidates, price, search.scattered(fit), has)
@@ -97,9 +100,8 @@ class Search:
         """
         wanted = candidate.imperfections
         problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted)
-        try:
-            trial = self.refit(replace(problem, reading_std=self.given, looseness=0.0), _as_read(estimate))
-        except UnsolvableError:
+        trial = self._fitted(replace(problem, reading_std=self.given, looseness=0.0), _as_read(estimate))
+        if trial is None:
             return None
         if (trial.problem.reading_std > 0).any():
             price *= SHARED
@@ -108,11 +110,20 @@ class Search:
             return None
         # It may be the way there that gained: then it is open without the correction, too.
         plain = self.back(trial, wanted, has)
+        if plain is None:
+            return None
         return (trial, wanted) if gained(plain, trial) > price else (plain, has)
 
-    def back(self, fit: Fit, has: Imperfections, wanted: Imperfections) -> Fit:
-        """Return the fit with less than it `has`, from where it is."""
-        return self.refit(*with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted))
+    def back(self, fit: Fit, has: Imperfections, wanted: Imperfections) -> Fit | None:
+        """Return the fit with less than it `has`, from where it is; None where there is none."""
+        return self._fitted(*with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted))
+
+    def _fitted(self, problem: Problem, estimate: Estimate) -> Fit | None:
+        """Return the fit; None where it leads nowhere: the one before stands."""
+        try:
+            return self.refit(problem, estimate)
+        except (UnsolvableError, np.linalg.LinAlgError):
+            return None
 
 
 def _price(fit: Fit, candidates: int) -> Callable[[Candidate], float]:
