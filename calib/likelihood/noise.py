@@ -14,8 +14,9 @@ from calib.likelihood.scatter import PoseMisfit, Scatter, estimated_scatter
 
 Array = NDArray[np.float64]
 
+LEAST_POINT_NOISE = 1e-5
 LEAST_POSE_NOISE = 1e-9
-"""In rad and m: given poses may be exact to rounding."""
+"""In px, and in rad and m: better is not measured, and what was made up may be exact to rounding."""
 FEWEST_POINTS = 4
 """Points that a view must have kept to say where its camera was."""
 SETTLED = 0.02
@@ -61,7 +62,8 @@ def _sizes(
     spent, sizes = int(problem.free.sum()), []
     for group, view, weight in zip(problem.groups, freed, weights.groups, strict=True):
         if isinstance(group.data, PointViews):
-            sizes.append(np.array(point_noise(view.left, group.data.present)))
+            least = LEAST_POINT_NOISE * np.median(group.data.whitening[..., 0, 0])
+            sizes.append(np.maximum(point_noise(view.left, group.data.present), least))
         else:
             assert isinstance(view, Given)
             least = LEAST_POSE_NOISE * np.diag(group.data.whitening)

@@ -28,8 +28,7 @@ and in position each for itself."""
 KNOCKED = 3 * float(f.isf(1e-3, 3, STUDENT))
 """How far a given pose's squared rotation or position error may be, in units of its size, for it to count at all."""
 EXACT = 0.1
-LEAST_POINT_NOISE = 1e-5
-"""In px, or of what a covariance says: better is not measured, and made-up points may be exact."""
+"""Part of its noise below which a misfit is rounding."""
 FARTHEST = {freedom: float(chi2.isf(RARE, freedom)) for freedom in (2, 6)}
 """How far the square of so many numbers of unit variance may be for good ones."""
 MEDIAN = {freedom: float(chi2.median(freedom)) for freedom in (2, 3, 6)}
@@ -206,7 +205,7 @@ def point_noise(left: Array, present: Array) -> float:
     first = float(np.nanmedian(left[present > 0])) / MEDIAN[2]
     good = (present > 0) & (left < FARTHEST[2] * first)
     freedom = 2 * good.sum() - 6 * len(left)
-    return max(float(np.sqrt(left[good].sum() / max(freedom, 1))), LEAST_POINT_NOISE)
+    return float(np.sqrt(left[good].sum() / max(freedom, 1)))
 
 
 def _freed(blocks: Blocks, present: Array) -> Freed:
