@@ -63,13 +63,15 @@ def built(session: Session, observations: Sequence[Observation], start: Start) -
             views = np.array([observation.view for observation in given], dtype=np.intp)
             poses = np.array([observation.pose for observation in given])
             groups.append(Group(index, link, None, GivenPoses(views, poses, np.eye(6))))
-    readings, noisiness = at_rest(session)
+    readings, rests = at_rest(session)
     problem = Problem(
         layout=layout,
         groups=tuple(groups),
         readings=readings,
         regressors=np.zeros((*readings.shape, 0)),
-        noisiness=noisiness,
+        rests=rests,
+        at_rest=np.zeros((*readings.shape, 0)),
+        noisiness=np.ones_like(readings),
         looseness=0.0,
         reading_std=np.array([joint.reading_std or 0.0 for joint in session.joints]),
         free=known.free,

@@ -35,10 +35,10 @@ def chain_terms(
 ) -> ChainTerms:
     """Return the terms of views at `readings` (n, m) of a camera that `link` joints move.
 
-    `regressors` (n, m, k) say how much of each correction's coefficient is added to each reading.
+    `regressors` (n, m, r + k) say how much of each rest, and of each correction's coefficient, is added to readings.
     """
     chain, count = state.chain, len(readings)
-    corrected = readings + regressors @ state.corrections
+    corrected = readings + regressors @ np.concatenate([state.rests, state.corrections])
     by_parameter = np.zeros((count, 6, len(layout)))
     by_reading = np.zeros((count, 6, len(chain)))
     after = np.broadcast_to(inverse(state.mounts[camera]), (count, 4, 4))
@@ -52,5 +52,5 @@ def chain_terms(
         by_reading[:, :, joint] = turning
         after, carried = before, carried_before
     by_parameter[:, :, layout.mounts[camera]] = np.eye(6)
-    by_parameter[:, :, layout.corrections] = by_reading @ regressors
+    by_parameter[:, :, layout.rests.start : layout.corrections.stop] = by_reading @ regressors
     return ChainTerms(inverse(after), by_parameter, by_reading)

@@ -43,7 +43,9 @@ def held_out(
     `there` is the fit, `as_read` the same chain with each reading as it was read: a prediction knows no better.
     `information` (p, p) is that of all views.
     """
-    free = np.flatnonzero(problem.free)
+    free, rests = np.flatnonzero(problem.free), problem.layout.rests
+    # How far joints at rest are from what was read is not known to a prediction.
+    known = (free < rests.start) | (free >= rests.stop)
     errors: list[HeldOut] = []
     for group, weight, terms, read in zip(
         problem.groups, weights.groups, there.terms, as_read.terms, strict=True
@@ -54,7 +56,7 @@ def held_out(
         own = np.swapaxes(ours, 1, 2) @ hessian @ ours
         pull = (np.swapaxes(ours, 1, 2) @ slope[..., None])[..., 0]
         steps, determined = _steps_without(information[np.ix_(free, free)], own, pull)
-        moved = read.blocks.jacobian @ (ours @ steps[..., None])
+        moved = read.blocks.jacobian @ (ours @ (known * steps)[..., None])
         for row in range(len(own)):
             if not determined[row] or not np.any(weight[row] > 0):
                 continue

@@ -66,8 +66,8 @@ def _sizes(
             sizes.append(np.maximum(point_noise(view.left, group.data.present), least))
         else:
             assert isinstance(view, Given)
-            least = LEAST_POSE_NOISE * np.diag(group.data.whitening)
-            sizes.append(np.hypot(_pose_sizes(view.residuals, weight, spent), least))
+            smallest = LEAST_POSE_NOISE * np.diag(group.data.whitening)
+            sizes.append(np.hypot(_pose_sizes(view.residuals, weight, spent), smallest))
     return sizes
 
 

@@ -152,6 +152,7 @@ def information_of(
         readings=others.readings,
         noisiness=problem.noisiness[others.views],
         regressors=problem.regressors[others.views],
+        at_rest=problem.at_rest[others.views],
         prior=np.zeros_like(problem.prior),
     )
     still = replace(estimate, reading_errors=np.zeros_like(others.readings), offsets=tuple(offsets))

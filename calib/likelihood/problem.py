@@ -26,11 +26,24 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
+class Rest:
+    """A joint that stands still in some `views` (k,): what its readings are off by there, it is off by in all.
+
+    `share` is how much of a reading's noise that is: less than 1 where many readings of it were averaged.
+    """
+
+    joint: int
+    views: NDArray[np.intp]
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """A session as a likelihood.
 
     `readings` (n, m) are those of all the session's views, `regressors` (n, m, k) say how much of each correction
-    is added to them, `reading_std` (m,) how noisy they are, and `noisiness` (n, m) how much of that noise each
+    is added to them, `rests` are where joints stand still, `at_rest` (n, m, r) what the state's add to the
+    readings, `reading_std` (m,) how noisy they are, and `noisiness` (n, m) how much of that noise each
     has: the mean of an idle joint's readings over a sweep has less. `looseness` says how many times the covariance
     that its points give a view's pose its distance from the chain has beyond that. `free` (p,) are the parameters that
     may move, `prior` (p, p) the information that says how far from the start. `bulges` (t, w) are the shapes of the
@@ -41,6 +54,8 @@ class Problem:
     groups: tuple[Group, ...]
     readings: Array
     regressors: Array
+    rests: tuple[Rest, ...]
+    at_rest: Array
     reading_std: Array
     noisiness: Array
     looseness: float
@@ -158,7 +173,8 @@ def _chain_terms(problem: Problem, group: Group, estimate: Estimate) -> ChainTer
     views = group.data.views
     noisiness = problem.noisiness[views]
     readings = problem.readings[views] + noisiness * estimate.reading_errors[views]
-    terms = chain_terms(
-        estimate.state, problem.layout, group.camera, group.link, readings, problem.regressors[views]
-    )
+    regressors = problem.regressors[views]
+    if len(estimate.state.rests):
+        regressors = np.concatenate([problem.at_rest[views], regressors], axis=2)
+    terms = chain_terms(estimate.state, problem.layout, group.camera, group.link, readings, regressors)
     return replace(terms, by_reading=terms.by_reading * noisiness[:, None, :])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calib.likelihood.building import Start, built
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
-from calib.likelihood.idle import as_the_views_follow
+from calib.likelihood.idle import as_the_views_follow, resting
 from calib.likelihood.imperfections import Imperfections
 from calib.likelihood.lens_terms import lens_from_vector
 from calib.likelihood.noise import seen_noise
@@ -72,7 +72,8 @@ class Refined:
     def held_out(self) -> list[HeldOut]:
         """Return how well each view is predicted by the fit of all others."""
         estimate = self.descent.estimate
-        as_read = replace(estimate, reading_errors=np.zeros_like(estimate.reading_errors))
+        state = replace(estimate.state, rests=np.zeros_like(estimate.state.rests))
+        as_read = replace(estimate, state=state, reading_errors=np.zeros_like(estimate.reading_errors))
         return held_out(
             self.problem,
             estimate,
@@ -122,9 +123,10 @@ def _settled(problem: Problem, estimate: Estimate, as_read: Array, unknown: NDAr
     `as_read` (n, m) are the readings, also of joints that should stand still; `unknown` (m,) tells the joints whose
     readings' noise nobody said.
     """
-    problem, estimate, weights, aside = _approached(problem, estimate)
+    problem, estimate, weights, aside = _approached(*resting(problem, estimate))
     problem, estimate = as_the_views_follow(problem, estimate, weights, as_read)
     for _ in range(MOST_PASSES):
+        problem, estimate = resting(problem, estimate)
         descent = descend(problem, estimate, weights)
         estimate, known = descent.estimate, step_covariance(problem, descent, 1.0)
         problem, found, settled = seen_noise(problem, estimate, weights, known, unknown)

@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 class State:
     """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens as a vector, None for none.
 
-    `corrections` (k,) are coefficients of what is added to readings, `warp` (w,) of what is added to the target,
-    `aspects` (a,) by how much some sensors that give poses see y too large.
+    `rests` (r,) are how far joints at rest stand from what was read, `corrections` (k,) coefficients of what is added
+    to readings, `warp` (w,) of what is added to the target, and `aspects` (a,) by how much some sensors that give poses
+    see y too large.
     """
 
     chain: Chain
@@ -33,6 +34,7 @@ class State:
     corrections: Array
     warp: Array
     aspects: Array = field(default_factory=lambda: np.zeros(0))
+    rests: Array = field(default_factory=lambda: np.zeros(0))
 
     def moved(self, step: Array, layout: "Layout") -> "State":
         """Return the state after a step (p,) of the layout's parameters."""
@@ -56,6 +58,7 @@ class State:
             corrections=self.corrections + step[layout.corrections],
             warp=self.warp + step[layout.warp],
             aspects=self.aspects + step[layout.aspects],
+            rests=self.rests + step[layout.rests],
         )
 
 
@@ -72,6 +75,7 @@ class Layout:
     mounts: tuple[slice, ...]
     lenses: tuple[slice, ...]
     lens_changes: tuple[Array, ...]
+    rests: slice
     corrections: slice
     warp: slice
     aspects: slice
@@ -117,6 +121,7 @@ class Layout:
                 np.eye(part.stop - part.start) if change is None else change
                 for part, change in zip(lenses, changes, strict=True)
             ),
+            rests=take("rest"),
             corrections=take("correction", *corrections),
             warp=take("warp", *warp),
             aspects=take("aspect"),

