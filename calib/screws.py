@@ -19,6 +19,8 @@ Ints = NDArray[np.intp]
 
 HUBER = 1.345
 HUBER_PASSES = 12
+SETTLED = 1e-3
+"""By how much of its standard deviation a mean may still move."""
 CHI_MEDIAN = {1: 0.6745, 2: 1.1774}
 HALF_A_TURN = 0.98 * np.pi
 UNEVEN = 0.3
@@ -97,11 +99,13 @@ def robust_mean(values: Array, information: Array, dof: int) -> Array:
 
     The common scale of the deviations comes from their median (Huber 1981, with his 95 % efficient constant).
     """
-    weights = information
+    weights, root, mean = information, np.sqrt(information), np.full(values.shape[1], np.inf)
     for _ in range(HUBER_PASSES):
-        mean = np.asarray(weights @ values / weights.sum(), dtype=float)
-        deviation = np.linalg.norm(values - mean, axis=1) * np.sqrt(information)
+        before, mean = mean, np.asarray(weights @ values / weights.sum(), dtype=float)
+        deviation = np.linalg.norm(values - mean, axis=1) * root
         spread = np.median(deviation) / CHI_MEDIAN[dof]
+        if np.linalg.norm(mean - before) * np.sqrt(information.sum()) <= SETTLED * spread:
+            break
         weights = information / np.maximum(1, deviation / (HUBER * max(spread, 1e-300)))
     return mean
 
