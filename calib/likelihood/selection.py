@@ -30,8 +30,6 @@ MOST_TRIES = 3
 MOST_ROUNDS = 12
 BELONGS = float(chi2.isf(RARE, 6))
 """The squared distance beyond which a view does not belong."""
-SHARED = 3.0
-"""How many times its price a correction must gain among noisy readings: an idle joint's error is one for many views."""
 WORTH_TELLING = 0.02
 """The part of the misfit that an unused warp of the target must explain to be told of."""
 HINT = 4.0
@@ -103,8 +101,6 @@ class Search:
         trial = self._fitted(replace(problem, reading_std=self.given, looseness=0.0), _as_read(estimate))
         if trial is None:
             return None
-        if (trial.problem.reading_std > 0).any():
-            price *= SHARED
         worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
         if min([gained(fit, trial), *worth]) <= price:
             return None
