@@ -15,7 +15,8 @@ data flows through them:
     sweeps, screws, closed_form  the paper's method;  orientation  of symmetric targets;  first_solution  all of it
     nominal, unfinished          sessions with a drawing, and sessions that were cut off
     likelihood/, most_likely     the fit;  advice  what it does not tell, in words
-    corrections, warp            imperfect joints and targets;  stated_corrections, corrections_in_words  said
+    corrections, warp, pose_sensor               imperfect joints, targets and sensors
+    stated_corrections, corrections_in_words     what they are, said;  stated_quality  and how good it is
     links, dh, document          D-H and base read off the screws, and all written down: calibration
     pose_covariance, projection, dh_covariance   how sure a pose is, where a point is seen, and a D-H parameter
     residuals, quality, verdict, verification, paper      is it good?

@@ -32,6 +32,7 @@ from calib.session import (
     WorldOrigin,
 )
 from calib.stated_corrections import StatedCorrections
+from calib.stated_quality import Quality
 from calib.targets import Target, target_points
 
 CALIBRATION_FORMAT = "activecam.calibration/1"
@@ -95,74 +96,6 @@ class Covariance(Document):
         if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
             raise ValueError(f"matrix: must have {count} rows and columns, one for each parameter")
         return self
-
-
-class ViewQuality(Document):
-    """How well one view agrees with the calibration; null for what the view has no measure of."""
-
-    view: int
-    joint: str | None
-    use: Literal["fit", "verify"]
-    rms_px: Number | None = None
-    position_m: Number | None = None
-    rotation_rad: Number | None = None
-    held_out_px: Number | None = None
-    """Its rms error against the fit of all other views."""
-    held_out_position_m: Number | None = None
-    held_out_rotation_rad: Number | None = None
-    set_aside: bool = False
-    """Whether it was left out of the fit because it does not agree with the others."""
-
-
-class JointQuality(Document):
-    """How well the views agree in which one joint moved alone, or with a null name those outside of any such plan.
-
-    Pixels are rms over points, positions and rotations mean over views.
-    """
-
-    joint: str | None
-    views: int
-    rms_px: Number | None = None
-    position_m: Number | None = None
-    rotation_rad: Number | None = None
-    held_out_px: Number | None = None
-    held_out_position_m: Number | None = None
-    held_out_rotation_rad: Number | None = None
-
-
-class MeanAndMax(Document):
-    """The mean and the largest of some numbers."""
-
-    mean: Number
-    max: Number
-
-
-class Quality(Document):
-    """Residuals of fit and held-out views (px, rms over points), view by view, and warnings in words.
-
-    The held-out figures are what the verdict goes by: mean position (m) and rotation (rad) where the views carry
-    given poses.
-    """
-
-    judgement: Literal["good", "usable", "poor", "unknown"] | None = None
-    verdict: str | None = None
-    """The judgement and what it rests on, in a sentence."""
-    rms_px: Number | None = None
-    held_out_rms_px: Number | None = None
-    held_out_position_m: Number | None = None
-    held_out_rotation_rad: Number | None = None
-    held_out_by: Literal["verify", "leave_one_view_out"] | None = None
-    """By which views: those marked `verify`, or each by the fit of all others."""
-    corrections: list[str] = Field(default_factory=list)
-    """A sentence for each of the calibration's corrections."""
-    noise_px: Number | None = None
-    """How much single points scatter (rms) where their view's pose is free: no prediction can be better."""
-    position_std_m: MeanAndMax | None = None
-    rotation_std_rad: MeanAndMax | None = None
-    """How sure the camera's pose is at the fit's readings, the three directions together."""
-    joints: list[JointQuality] = Field(default_factory=list)
-    views: list[ViewQuality] = Field(default_factory=list)
-    warnings: list[str] = Field(default_factory=list)
 
 
 class Calibration(Document):

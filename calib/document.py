@@ -13,7 +13,6 @@ from calib.calibration import (
     DhLink,
     DhStd,
     JointScrew,
-    Quality,
 )
 from calib.chain import Chain
 from calib.dh_covariance import dh_covariance
@@ -22,6 +21,7 @@ from calib.parameters import held_values
 from calib.session import Session
 from calib.solution import Solution
 from calib.stated_corrections import stated_corrections
+from calib.stated_quality import Quality
 from calib.transforms import inverse
 
 Method = Literal["ml", "closed_form"]

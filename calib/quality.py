@@ -8,11 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.calibration import Calibration, JointQuality, MeanAndMax, Quality, ViewQuality
+from calib.calibration import Calibration
 from calib.observations import Observation
 from calib.residuals import ViewResidual, view_residuals
 from calib.session import Session
 from calib.solution import Solution
+from calib.stated_quality import JointQuality, MeanAndMax, Quality, ViewQuality
 from calib.verdict import judgement_and_verdict
 
 Array = NDArray[np.float64]

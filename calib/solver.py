@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from calib.advice import weakness_in_words
-from calib.calibration import Calibration, Quality
+from calib.calibration import Calibration
 from calib.corrections_in_words import FLAT, corrections_in_words, unused_warp_in_words
 from calib.document import Method, document
 from calib.errors import UnsolvableError
@@ -16,6 +16,7 @@ from calib.parameters import Held
 from calib.quality import judged
 from calib.session import Session
 from calib.solution import Solution
+from calib.stated_quality import Quality
 from calib.targets import target_points
 from calib.unfinished import finished_part
 

@@ -19,8 +19,8 @@ from math import sqrt
 from typing import Literal
 
 from calib.advice import what_is_weak
-from calib.calibration import MeanAndMax, Quality, ViewQuality
 from calib.likelihood.weakness import Weakness
+from calib.stated_quality import MeanAndMax, Quality, ViewQuality
 
 Judgement = Literal["good", "usable", "poor", "unknown"]
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from calib.calibration import JointQuality, Quality, ViewQuality
+from calib.stated_quality import JointQuality, Quality, ViewQuality
 from daemon.cli.console import output
 
 WORST = 5

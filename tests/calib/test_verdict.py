@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.random_rigs import LookingRig, looking_rig, noisy_session, session_of_views
 from calib import Calibration, solve
-from calib.calibration import MeanAndMax, Quality, ViewQuality
 from calib.session import Session
+from calib.stated_quality import MeanAndMax, Quality, ViewQuality
 from calib.verdict import judgement_and_verdict
 from tests.calib.likelihood.weak_rigs import pan_and_tilt, seen, slide_along_the_line_of_sight
 from tests.calib.rigs import pose_session

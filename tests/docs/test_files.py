@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from calib import Calibration, load_calibration, load_session, solve, stated_corrections
+from calib import Calibration, load_calibration, load_session, solve, stated_corrections, stated_quality
 from calib import calibration as calib_file
 from calib import session as calib_session
 from daemon.profile import load_profile, tables
@@ -57,10 +57,10 @@ MODELS: dict[str, type[BaseModel]] = {
     "### Coupling": stated_corrections.StatedCoupling,
     "### Target warp": stated_corrections.TargetWarp,
     "### Covariance": calib_file.Covariance,
-    "### Quality": calib_file.Quality,
-    "### A joint's quality": calib_file.JointQuality,
-    "### A mean and a maximum": calib_file.MeanAndMax,
-    "### A view's quality": calib_file.ViewQuality,
+    "### Quality": stated_quality.Quality,
+    "### A joint's quality": stated_quality.JointQuality,
+    "### A mean and a maximum": stated_quality.MeanAndMax,
+    "### A view's quality": stated_quality.ViewQuality,
 }
 
 
