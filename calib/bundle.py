@@ -17,8 +17,11 @@ Array = NDArray[np.float64]
 MOST_STEPS = 50
 CONVERGED = 1e-3
 """What a further step would gain, in units of one measurement's mean cost, below which it is not taken."""
-FAR = 100.0
+FIRST_DAMPING, MOST_DAMPING = 1e-6, 1e12
+FAR = 1000.0
 """What a step promises, in the same units, from which on what centroids of disks are off by is asked anew."""
+OUT_OF_DATE = 0.01
+"""What doing so may gain at the end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,31 +44,31 @@ def adjust(
     values = prior.imposed(lens_vector(lens))
     lens = lens_from_vector(values, lens)
     freedom = max(2 * float(seen.present.sum()) - 6 * len(poses) - int(prior.free.sum()), 1)
-    offsets = disk_offsets(seen, poses, lens, disk_diameter)
+    # At first the lens and the poses are off by far more than centroids of disks.
+    offsets = np.zeros_like(seen.pixels)
     blocks = _blocks(seen, poses, values, lens, offsets)
-    damping, growth = 1e-6, 4.0
+    damping, growth = FIRST_DAMPING, 4.0
     for _ in range(MOST_STEPS):
         # How noisy the points are is not known: the prior is weighed by what they are seen to be here.
         noise = float(blocks.cost.sum()) / freedom
         step, twists, gain = _step(blocks, values, prior, noise, damping)
-        moved = poses @ exp_twist(twists), values + step
-        renewed = offsets
+        moved, renewed = (poses @ exp_twist(twists), values + step), offsets
         if gain > FAR * noise:
             renewed = disk_offsets(seen, moved[0], lens_from_vector(moved[1], lens), disk_diameter)
         there = _blocks(seen, *moved, lens, renewed)
         cost = there.cost.sum() + noise * prior.misfit(moved[1])
-        if not cost <= blocks.cost.sum() + noise * prior.misfit(values):
+        if cost <= blocks.cost.sum() + noise * prior.misfit(values):
+            (poses, values), blocks, offsets = moved, there, renewed
+            damping, growth = max(damping / 10, 1e-12), 4.0
+            done = gain <= CONVERGED * cost / freedom
+        else:
             damping, growth = damping * growth, growth * 2
-            if damping > 1e12:
-                break
-            continue
-        (poses, values), blocks, offsets = moved, there, renewed
-        damping, growth = max(damping / 10, 1e-12), 4.0
-        if gain <= CONVERGED * cost / freedom:
+            done = damping > MOST_DAMPING
+        if done:
             renewed = disk_offsets(seen, poses, lens_from_vector(values, lens), disk_diameter)
-            if out_of_date(seen, offsets, renewed) <= CONVERGED * noise:
+            if out_of_date(seen, offsets, renewed) <= OUT_OF_DATE * noise:
                 break
-            offsets = renewed
+            offsets, damping, growth = renewed, FIRST_DAMPING, 4.0
             blocks = _blocks(seen, poses, values, lens, offsets)
     variance = float(blocks.cost.sum()) / freedom
     information, _, _ = _reduced(blocks, 0.0)

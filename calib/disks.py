@@ -7,7 +7,7 @@ offset to the predicted centre, here and nowhere else; detectors report centroid
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.lens import project_points
+from calib.lens import project_coordinates
 from calib.session import Intrinsics
 
 Array = NDArray[np.float64]
@@ -26,17 +26,22 @@ def centroid_offsets(centres: Array, camera_from_world: Array, diameter: float, 
     `diameter` in m.
     """
     angles = 2 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS
-    rim = diameter / 2 * np.stack([np.cos(angles), np.sin(angles)])
-    rotation, translation = camera_from_world[..., :3, :3], camera_from_world[..., None, :3, 3]
-    placed = centres @ np.swapaxes(rotation, -1, -2) + translation
-    across, middle = rotation[..., :2] @ rim, project_points(placed, lens)
-    seen = [project_points(placed + across[..., None, :, k], lens) - middle for k in range(RIM_POINTS)]
-    x, y = np.stack([points[..., 0] for points in seen]), np.stack([points[..., 1] for points in seen])
+    rotation, translation = camera_from_world[..., :3, :3], camera_from_world[..., :3, 3:]
+    placed = rotation @ np.swapaxes(centres, -1, -2) + translation
+    across = diameter / 2 * rotation[..., :2] @ np.stack([np.cos(angles), np.sin(angles)])
+    middle = _seen(placed, lens)
+    seen = [_seen(placed + across[..., k : k + 1], lens) - middle for k in range(RIM_POINTS)]
+    x, y = np.stack(seen, axis=1)
     # Green's theorem over the rim; derivatives by the sampled rim's own Fourier series.
     dx, dy = np.tensordot(FOURIER_DERIVATIVE, x, 1), np.tensordot(FOURIER_DERIVATIVE, y, 1)
     area = 2 * np.einsum("k...,k...->...", x, dy)
     moments = [np.einsum("k...,k...,k...->...", x, x, dy), -np.einsum("k...,k...,k...->...", y, y, dx)]
     return np.asarray(np.stack(moments, axis=-1) / area[..., None])
+
+
+def _seen(points: Array, lens: Intrinsics) -> Array:
+    """Return the pixels (2, ..., q) of points (..., 3, q) in the camera's frame."""
+    return np.stack(project_coordinates(np.moveaxis(points, -2, 0), lens))
 
 
 def _fourier_derivative(count: int) -> Array:

@@ -21,10 +21,15 @@ def project_points(points: ArrayLike, lens: Intrinsics) -> Array:
 
     NaN for points not in front of the camera, or outside the cone for which the lens model holds.
     """
-    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    return np.stack(project_coordinates(np.moveaxis(np.asarray(points, dtype=float), -1, 0), lens), axis=-1)
+
+
+def project_coordinates(points: Array, lens: Intrinsics) -> tuple[Array, Array]:
+    """Return both coordinates (...) of the same pixels, of points (3, ...): far faster than pairs and triples."""
+    x, y, z = points
     depth = np.where(z > 0, z, np.nan)
     u, v = _distorted(x / depth, y / depth, lens)
-    return np.stack([lens.fx * u + lens.cx, lens.fy * v + lens.cy], axis=-1)
+    return lens.fx * u + lens.cx, lens.fy * v + lens.cy
 
 
 def pixel_rays(pixels: ArrayLike, lens: Intrinsics) -> Array:
@@ -65,7 +70,7 @@ def undistort(distorted: Array, lens: Intrinsics) -> Array:
 
 
 def _distorted(x: Array, y: Array, lens: Intrinsics) -> tuple[Array, Array]:
-    """Return distorted coordinates of undistorted ones, each an array of its own: far faster than pairs."""
+    """Return distorted coordinates (...) of undistorted ones."""
     square = x * x + y * y
     if lens.model == "division":
         under = 1 - 4 * lens.distortion[0] * square

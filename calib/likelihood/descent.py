@@ -22,7 +22,7 @@ CONVERGED = 1e-3
 NOTHING = 1e-5
 """What a step must promise to be taken at all: a few thousandths of a standard deviation."""
 MOST_DAMPING = 1e12
-FAR = 10.0
+FAR = 0.1
 """What a step promises from which on it is worth the while to ask anew what centroids of disks are off by."""
 OUT_OF_DATE = 1e-4
 """What doing so may gain at the end: a hundredth of a standard deviation."""
