@@ -265,6 +265,11 @@ def _require_smaller(name: str, value: float, limit_name: str, limit: float) -> 
         raise ValueError(f"{name} ({value:g} m) must be smaller than {limit_name} ({limit:g} m)")
 
 
+def marker_cells(dictionary: str) -> int:
+    """Return how many cells a side of a dictionary's markers has, the black border's included."""
+    return int(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)).markerSize) + 2
+
+
 def _dictionary_size(name: str) -> int:
     """How many markers the dictionary of OpenCV with this name has."""
     number: Any = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None

@@ -8,9 +8,12 @@ aprilgrid    corners of tags;  tag_edges: the lines that cross in them
 plane        how a flat target lies in the picture
 labelling    which of a grid's readings is the target's
 detector     one call for all kinds
+health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do
 """
 
 from calib.detection.detection import Detection
 from calib.detection.detector import detect
+from calib.detection.health import PictureHealth, picture_health
+from calib.detection.health_in_words import Fault, faults
 
-__all__ = ["Detection", "detect"]
+__all__ = ["Detection", "Fault", "PictureHealth", "detect", "faults", "picture_health"]

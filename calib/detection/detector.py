@@ -13,6 +13,8 @@ from calib.detection.charuco import detect_charuco
 from calib.detection.chessboard import detect_chessboard
 from calib.detection.circle_grid import detect_circle_grid
 from calib.detection.detection import Detection
+from calib.detection.health import picture_health
+from calib.detection.health_in_words import faults
 from calib.detection.picture import Picture, read_picture
 from calib.errors import DetectionError
 from calib.targets import AprilGrid, AsymmetricCircleGrid, Charuco, Chessboard, CircleGrid, NoTarget, Target
@@ -24,7 +26,8 @@ def detect(image: NDArray[np.generic], target: Target) -> Detection:
     The ids are the target's own. A target that looks the same after a turn is read so that its point 0 is the
     one nearest to the picture's top left corner; a mirrored reading is never given.
 
-    Raises DetectionError, in one sentence, where the target is not seen or the array is no picture.
+    Raises DetectionError, in one sentence, where the target is not seen or the array is no picture. What is
+    wrong with the picture, and may be why, is in it.
     """
     picture = read_picture(image)
     try:
@@ -33,7 +36,16 @@ def detect(image: NDArray[np.generic], target: Target) -> Detection:
         # OpenCV's finders assert on some pictures in which there is no target.
         raise DetectionError(
             f"the search of the picture for the {target.kind} broke off ({error.err}): is the target in it?"
+            f"{_likely_reason(image, target)}"
         ) from error
+    except DetectionError as error:
+        raise DetectionError(f"{error}{_likely_reason(image, target)}") from error
+
+
+def _likely_reason(image: NDArray[np.generic], target: Target) -> str:
+    """Say what is wrong with the picture, to be added to a question; nothing where it is good."""
+    found = [] if isinstance(target, NoTarget) else faults(picture_health(image, target))
+    return f" It may be that {found[0].message}" if found else ""
 
 
 def _detect(picture: Picture, target: Target) -> Detection:

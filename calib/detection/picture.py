@@ -39,6 +39,12 @@ def read_picture(image: NDArray[np.generic]) -> Picture:
 
     Raises DetectionError where it is no such picture, or one in which nothing can be seen.
     """
+    values = grey_values(image)
+    return Picture(_stretched(values), values.astype(np.float32), noise_of(values))
+
+
+def grey_values(image: NDArray[np.generic]) -> NDArray[np.uint8 | np.uint16]:
+    """Return the grey values (h, w) of such a picture as they are; raises DetectionError where it is none."""
     # OpenCV's readers return None for a file that is no picture, whatever the annotation says.
     if not isinstance(image, np.ndarray):
         raise DetectionError("there is no picture to look at: an array of grey or BGR values is needed")
@@ -56,8 +62,7 @@ def read_picture(image: NDArray[np.generic]) -> Picture:
             f"a picture of {width} x {height} px is too small to hold a target: check the camera's format"
         )
     depth = np.uint8 if image.dtype.itemsize == 1 else np.uint16
-    values = _as_grey(np.ascontiguousarray(image, dtype=depth))
-    return Picture(_stretched(values), values.astype(np.float32), _noise(values))
+    return _as_grey(np.ascontiguousarray(image, dtype=depth))
 
 
 def copies(grey: NDArray[np.uint8], side: int) -> Iterator[tuple[NDArray[np.uint8], float]]:
@@ -96,7 +101,7 @@ def _stretched(values: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
     return np.asarray(table[values])
 
 
-def _noise(values: NDArray[np.uint8 | np.uint16]) -> float:
+def noise_of(values: NDArray[np.uint8 | np.uint16]) -> float:
     """Estimate the standard deviation of the grey values' noise, at least that of rounding to whole numbers.
 
     From the median response to a mask that is blind to planes and edges (Immerkær, Fast noise variance

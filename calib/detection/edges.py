@@ -1,0 +1,140 @@
+"""How wide the edges in a picture are, in every direction: blur, and the smear of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, hypot, pi, sqrt
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+REACH = 12.0  # px to either side of an edge: edges of more than twice this are told as about that wide
+STEP = 0.5  # px between the samples of a profile
+MOST_EDGES = 2500
+FEWEST_EDGES = 30
+DIRECTIONS = 12
+FEWEST_IN_A_DIRECTION = 8
+LEAST_STEP = 0.5  # of the region's contrast: ink against paper, and not a shadow
+CLEAR_OF_NOISE = 8.0  # times the noise: a step of less tells nothing of its width
+BOX_FROM_WIDTH = sqrt(12) / 2.563  # a Gaussian's edge is 2.563 deviations wide, a box has length / sqrt(12)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The widths of the edges in a picture: from 10 to 90 % of the step, in px.
+
+    `narrowest_px` and `widest_px` are those across the directions in which edges are sharpest and least sharp;
+    the latter is at `direction` (rad, from the picture's x to its y, 0 to pi). A lens that is out of focus
+    makes all edges wide, a motion those across it: `smear_px` is the length of the motion that explains the
+    difference. Where there are edges of one direction only, or of two at right angles and the motion is
+    diagonal to them, nothing tells motion from blur, and the two widths are the same.
+    """
+
+    count: int
+    narrowest_px: float
+    widest_px: float
+    direction: float
+
+    @property
+    def smear_px(self) -> float:
+        """How far something has moved during the exposure, px."""
+        return BOX_FROM_WIDTH * sqrt(max(self.widest_px**2 - self.narrowest_px**2, 0.0))
+
+
+def measure_edges(
+    values: NDArray[np.float32], noise: float, region: NDArray[np.bool_] | None = None, reach: float = REACH
+) -> Edges | None:
+    """Measure the edges of grey `values` (h, w), or of a `region` (h, w) of them; None where there are too few.
+
+    `noise` is the standard deviation of the grey values, `reach` (px) how far the next edge is at least.
+    """
+    part = values if region is None else values[region]
+    dark, bright = np.percentile(part.ravel()[:: 1 + part.size // 100_000], (1, 99))
+    step = LEAST_STEP * float(bright - dark)
+    if step < CLEAR_OF_NOISE * noise:
+        return None
+    smooth = cv2.GaussianBlur(values, (0, 0), 1.0)
+    gradient = np.stack([cv2.Scharr(smooth, cv2.CV_32F, 1, 0), cv2.Scharr(smooth, cv2.CV_32F, 0, 1)]) / 32
+    steep = np.hypot(*gradient)
+    # Flat enough to catch the widest edge that can be told; which of them are edges the profiles say.
+    candidates = steep > max(step / (2 * reach), noise)
+    if region is not None:
+        candidates &= region
+    y, x = np.nonzero(candidates)
+    chosen = np.linspace(0, len(x) - 1, min(len(x), MOST_EDGES)).astype(int)
+    x, y = x[chosen], y[chosen]
+    normals = (gradient[:, y, x] / steep[y, x]).T.astype(np.float64)
+    widths = _widths(values, np.column_stack([x, y]), normals, reach, step)
+    known = np.isfinite(widths)
+    if known.sum() < FEWEST_EDGES:
+        return None
+    return _by_direction(widths[known], np.arctan2(normals[known, 1], normals[known, 0]))
+
+
+def _widths(
+    values: NDArray[np.float32], places: NDArray[np.int64], normals: Array, reach: float, step: float
+) -> Array:
+    """Measure the widths (m,) of edges at `places` (m, 2), from dark to bright along `normals` (m, 2).
+
+    NaN where the step is smaller than `step`, or the place is not amid it.
+    """
+    half = round(reach / STEP)
+    along = STEP * np.arange(-half, half + 1)
+    tangents = normals[:, ::-1] * [-1, 1]
+    # Three profiles side by side: half the noise, for no blur that counts.
+    samples = (
+        places[:, None, None]
+        + along[None, None, :, None] * normals[:, None, None]
+        + np.array([-1.0, 0.0, 1.0])[None, :, None, None] * tangents[:, None, None]
+    )
+    profiles = map_coordinates(
+        values, [samples[..., 1], samples[..., 0]], output=np.float64, order=1, mode="nearest"
+    ).mean(axis=1)
+    before, after = profiles[:, half::-1], profiles[:, half:]
+    dark, bright = before.min(axis=1), after.max(axis=1)
+    rise = np.maximum(bright - dark, 1e-9)
+    middle = (profiles[:, half] - dark) / rise
+    width = _first_beyond((after - dark[:, None]) / rise[:, None], 0.9)
+    width += _first_beyond((bright[:, None] - before) / rise[:, None], 0.9)
+    return np.where((rise >= step) & (abs(middle - 0.5) < 0.25), STEP * width, np.nan)
+
+
+def _first_beyond(profiles: Array, level: float) -> Array:
+    """Return where (m,) each of `profiles` (m, n), which reach 1, first passes `level`, in samples."""
+    first = np.argmax(profiles >= level, axis=1)
+    row = np.arange(len(profiles))
+    last, beyond = profiles[row, np.maximum(first - 1, 0)], profiles[row, first]
+    back = (beyond - level) / np.maximum(beyond - last, 1e-9)
+    return np.asarray(np.where(first > 0, first - back, 0.0))
+
+
+def _by_direction(widths: Array, directions: Array) -> Edges:
+    """Fit squared widths as a blur's covariance has them: a + b cos 2t + c sin 2t, from each direction's median."""
+    turned = np.floor(directions / pi * DIRECTIONS + 0.5).astype(int) % DIRECTIONS
+    rows = []
+    for one in range(DIRECTIONS):
+        own = turned == one
+        if own.sum() >= FEWEST_IN_A_DIRECTION:
+            twice = 2 * directions[own]
+            rows.append((np.cos(twice).mean(), np.sin(twice).mean(), np.median(widths[own]) ** 2))
+    if not rows:
+        width = float(np.median(widths))
+        return Edges(len(widths), width, width, 0.0)
+    cosine, sine, square = np.array(rows).T
+    # Directions that the edges do not tell are not made up: b and c are drawn to 0, a is not.
+    design = np.column_stack([np.ones(len(rows)), cosine, sine])
+    normal = design.T @ design + np.diag([0.0, 0.1, 0.1])
+    a, b, c = np.linalg.solve(normal, design.T @ square)
+    spread = hypot(b, c)
+    # Edges of few directions leave the extremes between them open: no more is said than was seen.
+    narrowest, widest = np.clip([a - spread, a + spread], square.min(), square.max())
+    return Edges(
+        count=len(widths),
+        narrowest_px=sqrt(narrowest),
+        widest_px=sqrt(widest),
+        direction=(atan2(c, b) / 2) % pi,
+    )
