@@ -142,4 +142,5 @@ def _of_target(target: TargetInPicture) -> list[Fault]:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    percent = 100 * share
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"

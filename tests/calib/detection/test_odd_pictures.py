@@ -1,0 +1,122 @@
+"""Half a target, two of them, one among other things, one in a strip: the right points, or a refusal in words."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from drawn_targets import WALL, Drawn, draw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from calib.detection import detect
+from calib.errors import DetectionError
+from calib.targets import (
+    AprilGrid,
+    AsymmetricCircleGrid,
+    Charuco,
+    Chessboard,
+    CircleGrid,
+    disk_diameter,
+    target_symmetries,
+)
+
+ALL = [
+    CircleGrid(rows=6, columns=7, pitch=0.03, disk_diameter=0.018),
+    AsymmetricCircleGrid(rows=7, columns=4, pitch=0.04, disk_diameter=0.016),
+    Chessboard(rows=6, columns=9, pitch=0.025),
+    Charuco(rows=5, columns=7, pitch=0.03, marker=0.021, dictionary="DICT_5X5_100"),
+    AprilGrid(rows=4, columns=5, tag=0.03, spacing=0.009),
+]
+KINDS = [target.kind for target in ALL]
+NUMBERED = ALL[3:]
+
+drawn_once = lru_cache(draw)
+
+
+def readings(drawn: Drawn, target) -> list[np.ndarray]:
+    """Return the truth (n, 2) in each of the ways in which the target may be read."""
+    truth = drawn.disk_centroids(target) if disk_diameter(target) else drawn.points
+    return [truth, *(truth[symmetry.permutation] for symmetry in target_symmetries(target))]
+
+
+def found_or_refused(picture, target, truths) -> bool:
+    """Whether the target was found; every point of it is where one of the truths has it, and that same one."""
+    try:
+        detection = detect(picture, target)
+    except DetectionError:
+        return False
+    misses = [np.linalg.norm(detection.pixels - truth[detection.ids], axis=1).max() for truth in truths]
+    assert min(misses) < 0.2
+    return True
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+@pytest.mark.parametrize("rolls", [(0, 0), (5, -8), (0, 180), (0, 90)], ids=str)
+def test_of_two_targets_one_is_found_whole_or_none(target, rolls):
+    pair = [
+        drawn_once(target, size=(600, 600), tilt=tilt, roll=roll, fill=0.55, noise=1)
+        for tilt, roll in zip([(20, 10), (-15, 10)], rolls, strict=True)
+    ]
+    right = [truth + np.array([600, 0]) for truth in readings(pair[1], target)]
+    picture = np.hstack([drawn.picture for drawn in pair])
+    found = found_or_refused(picture, target, [*readings(pair[0], target), *right])
+    # Markers that are seen twice may be nobody's; a grid or a board has its own rim.
+    assert found or target in NUMBERED
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+@pytest.mark.parametrize("shift", [(250, 0), (-200, -150), (0, 250), (-420, 0)], ids=str)
+def test_of_half_a_target_the_points_are_right_or_none(target, shift):
+    drawn = drawn_once(target, fill=0.8, shift=shift, noise=1)
+    found_or_refused(drawn.picture, target, readings(drawn, target))
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+def test_one_target_among_others_of_other_kinds_is_found_alone(target):
+    own = drawn_once(target, size=(480, 480), tilt=(15, 10), fill=0.55, noise=1)
+    other = ALL[(ALL.index(target) + 1) % len(ALL)]
+    beside = drawn_once(other, size=(480, 480), tilt=(-10, 10), fill=0.55, noise=1)
+    found_or_refused(np.hstack([own.picture, beside.picture]), target, readings(own, target))
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+@pytest.mark.parametrize("shape", [(32, 5000), (5000, 32), (33, 40000)], ids=str)
+def test_a_strip_is_a_picture_without_a_target(target, shape):
+    stripes = np.where(np.indices(shape).sum(axis=0) // 20 % 2, 200, 30).astype(np.uint8)
+    with pytest.raises(DetectionError, match=r"is it in|is the target in it|whole"):
+        detect(stripes, target)
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+def test_a_target_in_a_long_strip_is_right_or_refused(target):
+    drawn = drawn_once(target, size=(640, 480), tilt=(20, 10), fill=0.6, noise=1)
+    picture = np.full((480, 6000), WALL, dtype=np.uint8)
+    picture[:, 3000:3640] = drawn.picture
+    found_or_refused(picture, target, [truth + np.array([3000, 0]) for truth in readings(drawn, target)])
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+def test_any_window_of_a_picture_shows_the_target_rightly_or_not_at_all(target):
+    drawn = drawn_once(target, roll=20, tilt=(25, -10), fill=0.6, noise=2)
+    truths = readings(drawn, target)
+
+    @settings(max_examples=15, deadline=None, derandomize=True)
+    @given(
+        left=st.integers(0, 400),
+        top=st.integers(0, 300),
+        width=st.integers(1, 640),
+        height=st.integers(1, 480),
+    )
+    def look(left: int, top: int, width: int, height: int) -> None:
+        window = drawn.picture[top : top + height, left : left + width]
+        found_or_refused(window, target, [truth - [left, top] for truth in truths])
+
+    look()
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+def test_a_hand_before_the_target_moves_no_point(target):
+    drawn = drawn_once(target, tilt=(20, 10), fill=0.6, noise=1)
+    picture = drawn.picture.copy()
+    picture[200:, 300:400] = 160
+    found_or_refused(picture, target, readings(drawn, target))
