@@ -14,7 +14,8 @@ from scipy.stats import chi2, f
 
 from calib.likelihood.blocks import Blocks
 from calib.likelihood.measurements import PointViews
-from calib.likelihood.problem import GroupTerms, Problem, Weights, all_in
+from calib.likelihood.normal import local_by_parameter
+from calib.likelihood.problem import Group, GroupTerms, Problem, Weights, all_in
 
 Array = NDArray[np.float64]
 
@@ -133,12 +134,15 @@ def misfits(
     A view that `weights` leave out is predicted by a fit that knows nothing of it: `covariance` (p, p) says how well.
     """
     distances, lefts, typical, typical_point = [], [], [], []
-    for own, view, present, weight in zip(terms, freed, all_in(problem).groups, weights.groups, strict=True):
+    for group, own, view, present, weight in zip(
+        problem.groups, terms, freed, all_in(problem).groups, weights.groups, strict=True
+    ):
         spread = own.chain.by_reading * problem.reading_std
         scatter = spread @ np.swapaxes(spread, 1, 2)
         out = ~weight.any(axis=1)
-        unseen = own.chain.by_parameter[out]
-        scatter[out] += unseen @ covariance @ np.swapaxes(unseen, 1, 2)
+        if out.any():
+            unseen = _shift_by_parameter(problem, group, own)[out]
+            scatter[out] += unseen @ covariance @ np.swapaxes(unseen, 1, 2)
         if isinstance(view, Freed):
             distance = view.loosened(problem.looseness).distance(scatter)
             typical_point.append(view.left[present > 0])
@@ -153,6 +157,17 @@ def misfits(
     return Misfits(
         tuple(distances), tuple(lefts), noise, max(noise, float(np.median(np.concatenate(typical))))
     )
+
+
+def _shift_by_parameter(problem: Problem, group: Group, terms: GroupTerms) -> Array:
+    """Return how the distances between freed and predicted poses (n, 6) change with the parameters (n, 6, p).
+
+    The prediction moves with the chain, and the freed pose with the lens: errors of both that leave the points where
+    they are seen, as a camera turned and its principal point shifted, leave the two together.
+    """
+    local, hessian = local_by_parameter(problem, group, terms), terms.blocks.hessian
+    follows = np.linalg.solve(hessian[:, :6, :6], hessian[:, :6, 6:])
+    return np.asarray(local[:, :6] + follows @ local[:, 6:])
 
 
 def _freedom(distances: Array) -> int:
