@@ -8,6 +8,7 @@
 data flows through them:
 
     session, targets             what was measured, and of what;  documents, session_writer  on disk
+    ink                          what is black on a printed target
     detection/, observations     the target's points in every picture
     parameters, lens_prior, held_chain           what is known beforehand
     lens, disks, tsai            lens models;  homography, bundle, lens_calibration, pose_from_view  lens and poses
