@@ -23,6 +23,7 @@
     │   └── UnknownCameraError (KeyError)      no camera of this name in the calibration
     ├── StoreError                             the database or its folder cannot be used
     │   └── UnknownCalibrationError (KeyError) no calibration of this id
+    ├── PrintError                             a target that cannot be drawn as large, or as finely, as asked
     └── ServeError                             the address cannot be served
 
 Every message is one sentence that says what happened and what to do.
@@ -123,6 +124,10 @@ class StoreError(DaemonError):
 
 class UnknownCalibrationError(StoreError, KeyError):
     """There is no calibration of this id."""
+
+
+class PrintError(DaemonError):
+    """The target does not fit on the paper, or the picture of it would be too large."""
 
 
 class ServeError(DaemonError):

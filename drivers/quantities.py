@@ -77,9 +77,12 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     return _finite(Decimal(number) * dimension.units[unit], text)
 
 
-def format_quantity(value: float, dimension: Dimension) -> str:
-    """Return the text that `parse_quantity` turns into exactly `value`."""
-    return f"{value!r} {dimension.si_unit}"
+def format_quantity(value: float, dimension: Dimension, unit: str | None = None) -> str:
+    """Return the text that `parse_quantity` turns into exactly `value`, in SI or in a decimal unit such as mm."""
+    if unit is None:
+        return f"{value!r} {dimension.si_unit}"
+    number = Decimal(repr(value)) / dimension.units[unit]
+    return f"{number.normalize():f} {unit}"
 
 
 def in_reading_unit(text: object, unit: str, dimension_suffix: RateSuffix = "") -> float:

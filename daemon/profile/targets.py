@@ -1,11 +1,12 @@
 """The profile's `[target]`: the session's targets (`calib.targets`), with lengths as quantities."""
 
+import json
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
 from calib import targets as calib
-from drivers.quantities import Length, PositiveLength
+from drivers.quantities import LENGTH, Length, PositiveLength, format_quantity
 
 _CONFIG = ConfigDict(extra="forbid", frozen=True, strict=True)
 PitchStd = Annotated[Length, Field(ge=0)]
@@ -75,3 +76,20 @@ def resolve_target(table: TargetTable) -> calib.Target:
     """Return the target as a session has it, lengths in metres."""
     target: calib.Target = TypeAdapter(calib.Target).validate_python(table.model_dump(exclude_none=True))
     return target
+
+
+def target_entries(target: calib.Target) -> dict[str, int | str]:
+    """Return what a profile's `[target]` says of a target: lengths in millimetres, the kind first."""
+    known = {"kind": target.kind} | {name: value for name, value in target if value is not None}
+    if "pitch_std" in known:
+        known["pitch_std"] = known.pop("pitch_std")  # last
+    return {
+        name: format_quantity(value, LENGTH, "mm") if isinstance(value, float) else value
+        for name, value in known.items()
+    }
+
+
+def target_table(target: calib.Target) -> str:
+    """Return a profile's `[target]`, in TOML."""
+    lines = [f"{name} = {json.dumps(value)}" for name, value in target_entries(target).items()]
+    return "\n".join(["[target]", *lines]) + "\n"

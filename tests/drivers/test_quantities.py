@@ -27,6 +27,20 @@ def test_what_is_written_is_read_back_exactly(value: float, dimension: q.Dimensi
     assert re.search(dimension.pattern, text)
 
 
+@given(value=numbers, unit=st.sampled_from(["m", "cm", "mm", "um"]))
+def test_what_is_written_in_a_unit_is_read_back_exactly(value: float, unit: str) -> None:
+    text = q.format_quantity(value, q.LENGTH, unit)
+    assert q.parse_quantity(text, q.LENGTH) == value
+    assert text.endswith(f" {unit}")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.03, "30 mm"), (0.0221, "22.1 mm"), (1.2, "1200 mm"), (0.0, "0 mm")]
+)
+def test_lengths_in_millimetres_read_as_people_write_them(value: float, text: str) -> None:
+    assert q.format_quantity(value, q.LENGTH, "mm") == text
+
+
 @pytest.mark.parametrize(
     ("text", "dimension", "value"),
     [
