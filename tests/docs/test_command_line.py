@@ -90,3 +90,15 @@ def test_pose_prints_what_the_page_shows(tmp_path: Path, capsys: pytest.CaptureF
     assert (found["readings"], found["std"]) == (shown["readings"], shown["std"])
     for key in ("world_from_camera", "base_from_camera"):
         np.testing.assert_allclose(found[key], shown[key], atol=1e-9)
+
+
+def test_target_prints_what_the_page_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    section = page(PAGE).partition("\n## activecam target\n")[2]
+    with pytest.raises(SystemExit) as ended:
+        main(shlex.split(section.partition("```sh\n")[2].partition("\n")[0])[1:])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == section.partition("```toml\n")[2].partition("```")[0]
+    assert (tmp_path / "target.pdf").exists()
