@@ -9,7 +9,7 @@ data flows through them:
 
     session, targets             what was measured, and of what;  documents, session_writer  on disk
     ink                          what is black on a printed target
-    detection/, observations     the target's points in every picture
+    picture_file, detection/, observations   the target's points in every picture;  coverage  of the picture by them
     parameters, lens_prior, held_chain           what is known beforehand
     lens, disks, tsai            lens models;  homography, bundle, lens_calibration, pose_from_view  lens and poses
     transforms, twists, chain    rigid motions, and the chain as a product of exponentials

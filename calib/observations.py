@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection import detect
 from calib.errors import DetectionError, ImageError, UnsolvableError
+from calib.picture_file import load_picture
 from calib.session import Session, View
 from calib.targets import TargetSymmetry
 from calib.transforms import rigid
@@ -100,15 +100,10 @@ def _observation(session: Session, index: int, view: View) -> Observation:
     )
 
 
-def read_picture(session: Session, view: View) -> NDArray[np.uint8]:
+def read_picture(session: Session, view: View) -> NDArray[np.generic]:
     """Return the view's picture as it is on disk; raises ImageError that names the file."""
     assert view.image is not None
-    path = session.folder / view.image
-    if not path.is_file():
-        raise ImageError(f"{path}: the picture is missing; put it back, or take its view out of session.json")
-    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if picture is None:
-        raise ImageError(
-            f"{path}: cannot be read as a picture; put it back, or take its view out of session.json"
-        )
-    return np.asarray(picture)
+    try:
+        return load_picture(session.folder / view.image)
+    except ImageError as error:
+        raise ImageError(f"{error}, or take its view out of session.json") from error

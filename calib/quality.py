@@ -1,7 +1,7 @@
 """How well a calibration explains the views that it was made from, and those held out."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import sqrt
 from typing import Literal
 
@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.calibration import Calibration
+from calib.coverage import coverage, missing_in_words
 from calib.observations import Observation
 from calib.residuals import ViewResidual, view_residuals
 from calib.session import Session
 from calib.solution import Solution
-from calib.stated_quality import JointQuality, MeanAndMax, Quality, ViewQuality
+from calib.stated_quality import CameraCoverage, JointQuality, MeanAndMax, Quality, ViewQuality
 from calib.verdict import judgement_and_verdict
 
 Array = NDArray[np.float64]
@@ -112,12 +113,30 @@ def judged(
         noise_px=solution.noise_px,
         position_std_m=position,
         rotation_std_rad=rotation,
+        coverage=_coverage(calibration, session, [o for o in observations if o.view in fitted]),
         joints=_by_joint(session, fitted, held_out),
         views=views,
         warnings=warnings,
     )
     judgement, verdict = judgement_and_verdict(quality, session.complete, solution.weaknesses)
     return quality.model_copy(update={"judgement": judgement, "verdict": verdict})
+
+
+def _coverage(
+    calibration: Calibration, session: Session, observations: Sequence[Observation]
+) -> list[CameraCoverage]:
+    """Return how the fit's views cover the picture of each camera whose lens they tell of."""
+    rows = []
+    for index, (given, camera) in enumerate(zip(session.cameras, calibration.cameras, strict=True)):
+        lens = camera.intrinsics
+        if lens is None or lens.width is None or lens.height is None:
+            continue
+        size = lens.width, lens.height
+        covered = coverage(session.target, size, [o for o in observations if o.camera == index])
+        # What is missing of a lens that is known already is not missed.
+        missing = [] if given.intrinsics is not None else missing_in_words(covered)
+        rows.append(CameraCoverage(camera=camera.name, missing=missing, **asdict(covered)))
+    return rows
 
 
 def _by_joint(session: Session, fitted: dict[int, Miss], held_out: dict[int, Miss]) -> list[JointQuality]:

@@ -40,6 +40,21 @@ class JointQuality(Document):
     held_out_rotation_rad: Number | None = None
 
 
+class CameraCoverage(Document):
+    """How well the views of the fit cover one camera's picture; see `calib.coverage`."""
+
+    camera: str
+    views: int
+    x: Number
+    y: Number
+    size: Number
+    skew: Number
+    covered: Number
+    cells: list[list[int]]
+    missing: list[str] = Field(default_factory=list)
+    """A sentence for each thing that the views leave out."""
+
+
 class MeanAndMax(Document):
     """The mean and the largest of some numbers."""
 
@@ -70,6 +85,7 @@ class Quality(Document):
     position_std_m: MeanAndMax | None = None
     rotation_std_rad: MeanAndMax | None = None
     """How sure the camera's pose is at the fit's readings, the three directions together."""
+    coverage: list[CameraCoverage] = Field(default_factory=list)
     joints: list[JointQuality] = Field(default_factory=list)
     views: list[ViewQuality] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)

@@ -15,6 +15,7 @@ from calib.errors import CalibError, FormatError
 from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError
 from daemon.lease import LeaseDesk
+from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
 from daemon.pose import ActiveCalibration, PoseService
 from daemon.procedure import RunManager
@@ -38,6 +39,7 @@ class Service:
         self.poses = PoseService(rig)
         self.runs = RunManager(rig, self.leases, store, self._use)
         self.pictures = LivePicture(rig)
+        self.sightings = LiveDetection(rig)
         self.streams = Streams()
         self.started_at = datetime.now(UTC)
         self.version = version("activecam")

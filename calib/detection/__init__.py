@@ -9,11 +9,22 @@ plane        how a flat target lies in the picture
 labelling    which of a grid's readings is the target's
 detector     one call for all kinds
 health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do
+inspection   both at once
 """
 
 from calib.detection.detection import Detection
 from calib.detection.detector import detect
 from calib.detection.health import PictureHealth, picture_health
 from calib.detection.health_in_words import Fault, faults
+from calib.detection.inspection import Inspection, inspect
 
-__all__ = ["Detection", "Fault", "PictureHealth", "detect", "faults", "picture_health"]
+__all__ = [
+    "Detection",
+    "Fault",
+    "Inspection",
+    "PictureHealth",
+    "detect",
+    "faults",
+    "inspect",
+    "picture_health",
+]

@@ -8,7 +8,6 @@ from math import atan2, hypot, pi, sqrt
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 REACH = 12.0  # px to either side of an edge: edges of more than twice this are told as about that wide
 STEP = 0.5  # px between the samples of a profile
@@ -38,11 +37,7 @@ class Edges:
     narrowest_px: float
     widest_px: float
     direction: float
-
-    @property
-    def smear_px(self) -> float:
-        """How far something has moved during the exposure, px."""
-        return BOX_FROM_WIDTH * sqrt(max(self.widest_px**2 - self.narrowest_px**2, 0.0))
+    smear_px: float
 
 
 def measure_edges(
@@ -91,9 +86,7 @@ def _widths(
         + along[None, None, :, None] * normals[:, None, None]
         + np.array([-1.0, 0.0, 1.0])[None, :, None, None] * tangents[:, None, None]
     )
-    profiles = map_coordinates(
-        values, [samples[..., 1], samples[..., 0]], output=np.float64, order=1, mode="nearest"
-    ).mean(axis=1)
+    profiles = _sampled(values, samples).mean(axis=1)
     before, after = profiles[:, half::-1], profiles[:, half:]
     dark, bright = before.min(axis=1), after.max(axis=1)
     rise = np.maximum(bright - dark, 1e-9)
@@ -101,6 +94,20 @@ def _widths(
     width = _first_beyond((after - dark[:, None]) / rise[:, None], 0.9)
     width += _first_beyond((bright[:, None] - before) / rise[:, None], 0.9)
     return np.where((rise >= step) & (abs(middle - 0.5) < 0.25), STEP * width, np.nan)
+
+
+def _sampled(values: NDArray[np.float32], pixels: Array) -> Array:
+    """Interpolate `values` (h, w) at `pixels` (..., 2), the border's beyond it: as cv2.remap, of any size."""
+    last = np.array(values.shape[::-1]) - 1
+    inside = np.clip(pixels, 0, last)
+    corner = np.minimum(inside.astype(np.int64), last - 1)
+    right, down = np.moveaxis(inside - corner, -1, 0)
+    first = corner[..., 1] * values.shape[1] + corner[..., 0]
+    flat = values.ravel()
+    above = flat[first] * (1 - right) + flat[first + 1] * right
+    first += values.shape[1]
+    below = flat[first] * (1 - right) + flat[first + 1] * right
+    return np.asarray(above * (1 - down) + below * down)
 
 
 def _first_beyond(profiles: Array, level: float) -> Array:
@@ -123,7 +130,7 @@ def _by_direction(widths: Array, directions: Array) -> Edges:
             rows.append((np.cos(twice).mean(), np.sin(twice).mean(), np.median(widths[own]) ** 2))
     if not rows:
         width = float(np.median(widths))
-        return Edges(len(widths), width, width, 0.0)
+        return Edges(len(widths), width, width, 0.0, 0.0)
     cosine, sine, square = np.array(rows).T
     # Directions that the edges do not tell are not made up: b and c are drawn to 0, a is not.
     design = np.column_stack([np.ones(len(rows)), cosine, sine])
@@ -137,4 +144,5 @@ def _by_direction(widths: Array, directions: Array) -> Edges:
         narrowest_px=sqrt(narrowest),
         widest_px=sqrt(widest),
         direction=(atan2(c, b) / 2) % pi,
+        smear_px=BOX_FROM_WIDTH * sqrt(widest - narrowest),
     )

@@ -1,4 +1,4 @@
-"""Routes of the live picture."""
+"""Routes of the live picture, and of what is seen in it."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
 
 from daemon.api.dependencies import ServiceDep
+from daemon.api.detection_document import DetectionDocument
 from daemon.api.problems import answers
 from daemon.live_picture import JpegPicture
 from daemon.service import Service
@@ -31,6 +32,16 @@ async def get_frame(service: ServiceDep) -> Response:
     picture = await service.pictures.newest()
     headers = {"Cache-Control": "no-store", "X-Frame-Sequence": str(picture.sequence)}
     return Response(picture.data, media_type="image/jpeg", headers=headers)
+
+
+@router.get(
+    "/detection",
+    summary="The target in the newest picture",
+    responses=answers(DeviceLostError, DeviceTimeoutError),
+)
+async def get_detection(service: ServiceDep) -> DetectionDocument:
+    """Look for the target in the newest frame, and say how good the picture is to measure in."""
+    return DetectionDocument.of(await service.sightings.newest())
 
 
 @router.get(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from calib.stated_quality import JointQuality, Quality, ViewQuality
+from calib.stated_quality import CameraCoverage, JointQuality, Quality, ViewQuality
 from daemon.cli.console import output
 
 WORST = 5
@@ -26,10 +26,20 @@ def print_quality(quality: Quality) -> None:
     worst = worst_views(quality.views)
     if worst:
         output.print(view_table(worst))
+    for covered in quality.coverage:
+        output.print(coverage_line(covered), markup=False, soft_wrap=True)
     for correction in quality.corrections:
         output.print(correction, markup=False, soft_wrap=True)
     if quality.verdict is not None:
         output.print(quality.verdict, markup=False, soft_wrap=True)
+
+
+def coverage_line(covered: CameraCoverage) -> str:
+    """Return how the views cover a camera's picture, and what they leave out."""
+    shares = (covered.x, covered.y, covered.size, covered.skew, covered.covered)
+    x, y, size, skew, cells = (f"{100 * share:.0f} %" for share in shares)
+    line = f"{covered.camera}: views cover X {x}, Y {y}, size {size}, skew {skew}; points in {cells} of the picture"
+    return "; ".join([line, *covered.missing])
 
 
 def joint_table(joints: Sequence[JointQuality]) -> Table:

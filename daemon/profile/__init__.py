@@ -7,7 +7,7 @@ A text goes through these in order: `source` (where it comes from), `lines` (whe
 from daemon.profile.axes import AxisProfile
 from daemon.profile.devices import CameraProfile, ControllerProfile
 from daemon.profile.errors import ProfileError
-from daemon.profile.load import load_profile
+from daemon.profile.load import load_profile, load_target
 from daemon.profile.procedure import FreeView, PlannedView, Procedure, Sweep
 from daemon.profile.profile import Profile
 from daemon.profile.source import shipped_profiles
@@ -23,5 +23,6 @@ __all__ = [
     "ProfileError",
     "Sweep",
     "load_profile",
+    "load_target",
     "shipped_profiles",
 ]

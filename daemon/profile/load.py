@@ -6,6 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from calib.targets import Target
 from daemon.profile.axes import resolve_axes
 from daemon.profile.devices import resolve_camera, resolve_controllers
 from daemon.profile.errors import ProfileError
@@ -16,7 +17,7 @@ from daemon.profile.profile import Profile
 from daemon.profile.simulation import check_simulation
 from daemon.profile.source import ProfileText, read_profile
 from daemon.profile.tables import PROFILE_FORMAT, ProfileTable
-from daemon.profile.targets import resolve_target
+from daemon.profile.targets import TargetAlone, resolve_target
 
 
 def load_profile(path_or_name: str | Path) -> Profile:
@@ -34,6 +35,20 @@ def load_profile(path_or_name: str | Path) -> Profile:
     problems.raise_any()
     assert table is not None
     return _resolve(table, source.path, problems)
+
+
+def load_target(path_or_name: str | Path) -> Target:
+    """Read the `[target]` of a profile, or of a file that holds nothing else; raises ProfileError.
+
+    Nothing else is checked: one can look at pictures before the rest of a rig is described.
+    """
+    source = read_profile(path_or_name)
+    document = _parse(source)
+    problems = Problems(source.file, document, scan_lines(source.text))
+    table = problems.validate(TargetAlone, {"target": document["target"]} if "target" in document else {}, ())
+    problems.raise_any()
+    assert table is not None
+    return resolve_target(table.target)
 
 
 def _parse(source: ProfileText) -> dict[str, Any]:

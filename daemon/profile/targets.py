@@ -3,7 +3,7 @@
 import json
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from calib import targets as calib
 from drivers.quantities import LENGTH, Length, PositiveLength, format_quantity
@@ -70,6 +70,12 @@ TargetTable = Annotated[
     CircleGridTable | AsymmetricCircleGridTable | ChessboardTable | CharucoTable | AprilGridTable,
     Field(discriminator="kind"),
 ]
+
+
+class TargetAlone(BaseModel):
+    """A file of which nothing but the `[target]` counts."""
+
+    target: TargetTable
 
 
 def resolve_target(table: TargetTable) -> calib.Target:

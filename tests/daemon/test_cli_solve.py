@@ -88,6 +88,11 @@ def test_it_ends_with_the_verdict_after_tables_by_joint_and_by_view(
     printed = capsys.readouterr().out
     quality = json.loads(session.with_name("c.json").read_text())["quality"]
     assert quality["verdict"] in printed
+    [covered] = quality["coverage"]
+    assert covered["views"] == len(quality["views"])
+    assert f"main: views cover X {100 * covered['x']:.0f} %" in printed
+    assert covered["missing"]
+    assert all(sentence in printed for sentence in covered["missing"])
     by_joint, by_view = printed.split("Views by joint")[1].split("The worst views")
     for row in quality["joints"]:
         cells = next(line for line in by_joint.splitlines() if row["joint"] in line).split("│")

@@ -59,6 +59,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "### Covariance": calib_file.Covariance,
     "### Quality": stated_quality.Quality,
     "### A joint's quality": stated_quality.JointQuality,
+    "### A camera's coverage": stated_quality.CameraCoverage,
     "### A mean and a maximum": stated_quality.MeanAndMax,
     "### A view's quality": stated_quality.ViewQuality,
 }

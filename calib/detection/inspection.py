@@ -1,0 +1,40 @@
+"""One look at a picture: what is found of the target in it, and how good it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection.detection import Detection
+from calib.detection.detector import detect
+from calib.detection.health import PictureHealth, picture_health
+from calib.detection.health_in_words import Fault, faults
+from calib.errors import DetectionError
+from calib.targets import Target
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What one look at a picture tells; `problem` says why there is no `detection`, where there is none."""
+
+    detection: Detection | None
+    problem: str | None
+    health: PictureHealth | None
+    """None where the array is no picture."""
+    faults: tuple[Fault, ...]
+
+
+def inspect(image: NDArray[np.generic], target: Target) -> Inspection:
+    """Look for the target in a picture, as `detect` does, and at the picture itself; raises nothing."""
+    detection, problem, health = None, None, None
+    try:
+        detection = detect(image, target)
+    except DetectionError as error:
+        problem = str(error)
+    try:
+        health = picture_health(image, target, detection)
+    except DetectionError as error:
+        problem = str(error)
+    return Inspection(detection, problem, health, () if health is None else tuple(faults(health)))

@@ -1,0 +1,36 @@
+"""What is seen of the target in the camera's newest frame, looked for once for all who ask."""
+
+import asyncio
+from dataclasses import dataclass
+from datetime import datetime
+
+from calib.detection import Inspection, inspect
+from daemon.rig import Rig
+from drivers.camera import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One frame, when it was exposed, and what is in it."""
+
+    frame: Frame
+    taken_at: datetime
+    inspection: Inspection
+
+
+class LiveDetection:
+    """The target in the newest frame of a rig's camera."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._newest: Sighting | None = None
+        self._looking = asyncio.Lock()
+
+    async def newest(self) -> Sighting:
+        """Look for the target in the newest frame; raises DeviceLostError, DeviceTimeoutError."""
+        async with self._looking:
+            frame = await self._rig.frame()
+            if self._newest is None or self._newest.frame is not frame:
+                inspection = await asyncio.to_thread(inspect, frame.image, self._rig.profile.target)
+                self._newest = Sighting(frame, self._rig.utc.at(frame.timestamp), inspection)
+            return self._newest

@@ -1,0 +1,98 @@
+"""`activecam detect` looks at all pictures, says how good they are, and does not stop at a bad one."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from daemon.cli.main import main
+from tests.calib.detection.drawn_targets import draw
+
+TABLE = """
+[target]
+kind = "chessboard"
+rows = 6
+columns = 9
+pitch = "25 mm"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    from calib.targets import Chessboard
+
+    board = Chessboard(rows=6, columns=9, pitch=0.025)
+    (tmp_path / "board.toml").write_text(TABLE)
+    for name, shift in (("left", -120), ("right", 120)):
+        drawn = draw(board, tilt=(20, 10), fill=0.4, shift=(shift, 0), noise=1)
+        cv2.imwrite(str(tmp_path / f"{name}.png"), drawn.picture)
+    cv2.imwrite(str(tmp_path / "blurred.png"), draw(board, tilt=(20, 10), blur=4, noise=1).picture)
+    few_photons = np.random.default_rng(1).poisson(draw(board, tilt=(20, 10)).picture / 80)
+    cv2.imwrite(str(tmp_path / "dark.png"), few_photons.astype(np.uint8))
+    (tmp_path / "empty.png").write_bytes(b"")
+    return tmp_path
+
+
+def run(folder: Path, *words: str) -> int:
+    names = [str(folder / word) if word.endswith((".png", ".toml")) else word for word in words]
+    with pytest.raises(SystemExit) as ended:
+        main(["detect", *names])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code
+
+
+def test_pictures_are_judged_one_by_one_and_together(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(folder, "left.png", "right.png", "blurred.png", "--profile", "board.toml") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"{folder / 'left.png'}: 54 of 54 points, edges 2.")
+    assert lines[0].endswith("leaning 22 deg")
+    assert lines[2].startswith(f"{folder / 'blurred.png'}: 54 of 54 points, edges 9.")
+    assert lines[3].startswith("  the picture is blurred: edges are 9.")
+    assert lines[4].startswith("together: no view shows the target in the upper left")
+
+
+def test_a_picture_without_the_target_is_told_and_the_others_are_looked_at(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(folder, "empty.png", "dark.png", "left.png", "none.png", "--profile", "board.toml") == 1
+    empty, dark, left, none = capsys.readouterr().out.splitlines()
+    assert empty == f"{folder / 'empty.png'}: the file is empty: copy or take the picture again"
+    assert "too dark" in dark
+    assert "54 of 54 points" in left
+    assert "the picture is missing" in none
+
+
+def test_json_has_all_points_and_figures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = ["left.png", "right.png", "blurred.png", "empty.png"]
+    assert run(folder, *names, "--profile", "board.toml", "--json") == 1
+    document = json.loads(capsys.readouterr().out)
+    left, _, blurred, empty = document["pictures"]
+    assert left["found"]
+    assert left["faults"] == []
+    assert left["ids"] == list(range(54))
+    assert np.shape(left["pixels"]) == (54, 2)
+    assert left["health"]["target"]["of"] == 54
+    assert [fault["kind"] for fault in blurred["faults"]] == ["blurred"]
+    assert (empty["found"], empty["health"]) == (False, None)
+    assert document["coverage"]["views"] == 3
+    assert document["coverage"]["missing"]
+    run(folder, "left.png", "--profile", "board.toml", "--json")
+    assert json.loads(capsys.readouterr().out)["coverage"] is None
+
+
+def test_a_shipped_profile_names_its_target(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(folder, "left.png", "--profile", "pan-tilt") == 1
+    assert "ChArUco board" in capsys.readouterr().out
+
+
+def test_a_file_without_a_target_is_refused_by_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "bad.toml").write_text(TABLE.replace('"25 mm"', "25"))
+    assert run(folder, "left.png", "--profile", "bad.toml") == 1
+    assert "bad.toml:6: target.pitch: " in capsys.readouterr().err
+    (folder / "bad.toml").write_text("[camera]\n")
+    assert run(folder, "left.png", "--profile", "bad.toml") == 1
+    assert "target: is missing" in capsys.readouterr().err
