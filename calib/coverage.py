@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import degrees, radians, sqrt
 from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.plane import view_of_plane
+from calib.detection.health import tilt_of
+from calib.detection.plane import PlaneView, view_of_plane
 from calib.targets import Target, target_points
 
 ROWS, COLUMNS = 6, 9
 ENOUGH_X, ENOUGH_Y, ENOUGH_SIZE, ENOUGH_SKEW = 0.7, 0.7, 0.4, 0.5
-LEAST = 0.6  # of enough: less is said in words
+LEAST_SIZE = 0.6  # of enough: less is said in words
+LEAST_LEAN = radians(15)
 PLACES = (
     ("upper left", "upper middle", "upper right"),
     ("middle left", "middle", "middle right"),
@@ -45,8 +47,9 @@ class Coverage:
     Each of `x`, `y`, `size` and `skew` is 1 where the views are as different as that package asks for: the
     target's middle from one side of the picture to the other, and from top to bottom, over 0.7 of the room that
     the target leaves; one view in which it fills 0.4 of the picture (the root of its area's share); one in which
-    a corner of it is 0.25 rad off a right angle. `cells` are how many points were seen in each cell of a grid of 6 x 9
-    over the picture, `covered` is the share of cells with any.
+    a corner of it is 0.25 rad off a right angle. `lean` (rad) is the largest angle to the image plane. `cells`
+    are how many points were seen in each cell of a grid of 6 x 9 over the picture, `covered` is the share of cells
+    with any.
     """
 
     views: int
@@ -54,6 +57,7 @@ class Coverage:
     y: float
     size: float
     skew: float
+    lean: float
     covered: float
     cells: tuple[tuple[int, ...], ...]
 
@@ -66,15 +70,14 @@ def coverage(target: Target, size: tuple[int, int], views: Sequence[SeenPoints])
     for view in views:
         cells += _counts(view.pixels, size)
         shapes.append(_shape(target, size, view))
-    lowest, highest = np.zeros(4), np.zeros(4)
+    lowest, highest = np.zeros(5), np.zeros(5)
     if shapes:
         lowest, highest = np.min(shapes, axis=0), np.max(shapes, axis=0)
     lowest[2:] = 0.0  # a large and an oblique view tell something alone
-    x, y, large, skew = np.minimum(
-        (highest - lowest) / [ENOUGH_X, ENOUGH_Y, ENOUGH_SIZE, ENOUGH_SKEW], 1.0
-    ).tolist()
+    enough = [ENOUGH_X, ENOUGH_Y, ENOUGH_SIZE, ENOUGH_SKEW]
+    x, y, large, skew = np.minimum((highest - lowest)[:4] / enough, 1.0).tolist()
     rows = tuple(tuple(row) for row in cells.tolist())
-    return Coverage(len(views), x, y, large, skew, float((cells > 0).mean()), rows)
+    return Coverage(len(views), x, y, large, skew, float(highest[4]), float((cells > 0).mean()), rows)
 
 
 def missing_in_words(coverage: Coverage) -> list[str]:
@@ -88,15 +91,15 @@ def missing_in_words(coverage: Coverage) -> list[str]:
         sentences.append(
             f"no view shows the target in the {_listed(empty)} of the picture: what the lens does there is not seen"
         )
-    if coverage.size < LEAST:
+    if coverage.size < LEAST_SIZE:
         share = (coverage.size * ENOUGH_SIZE) ** 2
         sentences.append(
             f"the target is small in all views, {100 * share:.0f} % of the picture at most: take some from nearer"
         )
-    if coverage.skew < LEAST:
+    if coverage.lean < LEAST_LEAN:
         sentences.append(
-            "the target hardly leans in any view, which leaves the focal length to guess: lean it by 20 to 45 deg, in "
-            "several directions"
+            f"the target leans by {degrees(coverage.lean):.0f} deg at most, which hardly tells focal length from "
+            "distance: lean it by 20 to 45 deg"
         )
     return sentences
 
@@ -109,23 +112,23 @@ def _counts(pixels: Array, size: tuple[int, int]) -> NDArray[np.int64]:
     return counts.reshape(ROWS, COLUMNS)
 
 
-def _shape(target: Target, size: tuple[int, int], view: SeenPoints) -> tuple[float, float, float, float]:
-    """Return where the target's middle is, from 0 to 1 each way, how large it is, and how oblique."""
+def _shape(target: Target, size: tuple[int, int], view: SeenPoints) -> tuple[float, ...]:
+    """Return where the target's middle is, from 0 to 1 each way, how large it is, its skew and its lean."""
     width, height = size
     hull = cv2.convexHull(view.pixels.astype(np.float32))
     area = float(cv2.contourArea(hull))
     room = np.array([width, height]) - sqrt(area)
     middle = view.pixels.mean(axis=0) - sqrt(area) / 2
     x, y = np.clip(middle / np.maximum(room, 1.0), 0.0, 1.0).tolist()
-    return x, y, sqrt(area / (width * height)), _skew(target, view)
-
-
-def _skew(target: Target, view: SeenPoints) -> float:
-    """Return twice the angle (rad) by which the target's top right corner is off a right one, 1 at most."""
     points = target_points(target)[:, :2]
-    plane = view_of_plane(points[view.ids], view.pixels)
-    if plane is None:
-        return 0.0
+    found = points[view.ids]
+    plane = view_of_plane(found, view.pixels)
+    skew, lean = (0.0, 0.0) if plane is None else (_skew(plane, points), tilt_of(plane, found.mean(axis=0)))
+    return x, y, sqrt(area / (width * height)), skew, lean
+
+
+def _skew(plane: PlaneView, points: Array) -> float:
+    """Return twice the angle (rad) by which the target's top right corner is off a right one, 1 at most."""
     (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
     corners = plane.project(np.array([[left, top], [right, top], [right, bottom]]))
     a, b = corners[0] - corners[1], corners[2] - corners[1]

@@ -49,6 +49,7 @@ class CameraCoverage(Document):
     y: Number
     size: Number
     skew: Number
+    lean: Number
     covered: Number
     cells: list[list[int]]
     missing: list[str] = Field(default_factory=list)

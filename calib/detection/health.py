@@ -185,14 +185,14 @@ def _seen(target: Target, detection: Detection, size: tuple[int, int]) -> Target
         expected = view.project(points)
         outside = int(((expected < 0) | (expected > last)).any(axis=1).sum())
         element_px = float(length * view.scales(found).min())
-        tilt = _tilt(view, found.mean(axis=0))
+        tilt = tilt_of(view, found.mean(axis=0))
     area = cv2.contourArea(cv2.convexHull(pixels.astype(np.float32))) / (size[0] * size[1])
     border = float(min(pixels.min(), (last - pixels).min()))
     return TargetInPicture(len(pixels), len(points), outside, float(area), element, element_px, border, tilt)
 
 
-def _tilt(view: PlaneView, middle: Array) -> float:
-    """Return the angle (rad) by which a plane is foreshortened at `middle` (2,)."""
+def tilt_of(view: PlaneView, middle: Array) -> float:
+    """Return the angle (rad) to the image plane that foreshortens a plane at `middle` (2,) as much."""
     long, short = np.linalg.svd(view.jacobians(middle[None])[0], compute_uv=False)
     return acos(min(short / long, 1.0))
 

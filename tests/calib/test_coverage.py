@@ -48,6 +48,15 @@ def test_the_skew_is_how_far_a_corner_is_off_a_right_one():
     assert found.skew == pytest.approx(2 * np.arctan(0.1) / 0.5, rel=1e-4)
 
 
+@pytest.mark.parametrize("lean", [10, 40])
+def test_the_lean_is_the_angle_to_the_image_plane_of_the_view_that_leans_most(lean):
+    leaning = view(0.5, 0.5, 320)
+    leaning = seen((leaning.pixels - [640, 480]) * [1, np.cos(np.radians(lean))] + [640, 480])
+    found = coverage(GRID, SIZE, [view(0.5, 0.5, 320), leaning])
+    assert np.degrees(found.lean) == pytest.approx(lean, abs=0.1)
+    assert any("deg at most" in sentence for sentence in missing_in_words(found)) == (lean == 10)
+
+
 def test_views_all_over_leave_nothing_missing():
     places = [(x, y) for x in (0.2, 0.5, 0.8) for y in (0.2, 0.5, 0.8)]
     views = [view(x, y, 560, shear=0.4) for x, y in places]
@@ -68,7 +77,7 @@ def test_small_targets_that_never_lean_are_told():
     views = [view(x, y, 150) for x in (0.1, 0.3, 0.5, 0.7, 0.9) for y in (0.1, 0.3, 0.5, 0.7, 0.9)]
     small, upright = missing_in_words(coverage(GRID, SIZE, views))
     assert "1 % of the picture at most" in small
-    assert "hardly leans" in upright
+    assert "leans by 0 deg at most" in upright
 
 
 def test_no_view_at_all_is_said():
