@@ -111,10 +111,8 @@ def test_what_is_drawn_as_pdf_is_detected_where_it_is(target: Target) -> None:
     found = page.render(scale=300 / 72, grayscale=True).to_numpy()
     # PDFium stretches a page to whole pixels.
     height, width = found.shape[:2]
-    assert (
-        errors(found, target, picture_from_world(sheet, width / sheet.width, height / sheet.height)).max()
-        < 0.1
-    )
+    view = picture_from_world(sheet, width / sheet.width, height / sheet.height)
+    assert errors(found, target, view).max() < 0.05
 
 
 @settings(max_examples=25, deadline=None)
@@ -294,6 +292,36 @@ def test_words_say_what_it_is_and_what_to_do() -> None:
     words = " ".join(text.words for text in lay_out(CIRCLES, A4).texts)
     assert "circle grid, rows 6, columns 7, pitch 30 mm, disk diameter 18 mm" in words
     assert "both rulers must measure 100 mm" in words
+
+
+def test_files_have_the_words_in_white() -> None:
+    sheet = lay_out(CHARUCO, A4)
+    lines = [text.words for text in sheet.texts]
+    group = ET.fromstring(svg(sheet)).find("{http://www.w3.org/2000/svg}g")
+    assert group is not None
+    assert group.attrib["fill"] == "white"
+    assert [text.text for text in group] == lines
+    page = pypdfium2.PdfDocument(pdf(sheet))[0]
+    assert page.get_textpage().get_text_bounded().split() == " ".join(lines).split()
+
+
+def test_words_stay_in_their_bar() -> None:
+    sheet = lay_out(CHARUCO, A4)
+    left, top, width, height = sheet.ink.rectangles[-1]
+    words = pypdfium2.PdfDocument(pdf(sheet))[0].get_textpage()
+    boxes = np.array([words.get_charbox(index) for index in range(words.count_chars())]) * INCH / 72
+    assert boxes[:, 0].min() > left
+    assert boxes[:, 2].max() < left + width
+    assert sheet.height - boxes[:, 3].max() > top
+    assert sheet.height - boxes[:, 1].min() < top + height
+
+    scale = 300 / INCH
+    found = picture(png(sheet, 300))
+    first, last = np.ceil([[left, top], [left + width, top + height]] @ np.diag([scale, scale])).astype(int)
+    inside = found[first[1] : last[1] - 1, first[0] : last[0] - 1]
+    bright = np.argwhere(inside > 200)
+    assert bright.min() > 0.5e-3 * scale
+    assert np.all(bright.max(axis=0) < np.array(inside.shape) - 0.2e-3 * scale)
 
 
 def test_what_does_not_fit_is_told_with_what_would() -> None:
