@@ -105,11 +105,11 @@ def picture_health(
     height, width = values.shape
     noise = noise_of(values)
     full = 255 if values.dtype == np.uint8 else next(scale for scale in FULL_SCALES if values.max() <= scale)
-    seen = None if detection is None else _seen(target, detection, (width, height))
-    region, reach = None, REACH
-    if detection is not None:
+    seen, region, reach = None, None, REACH
+    if detection is not None and len(detection.ids):
+        seen = _seen(target, detection, (width, height))
         region = _hull(detection.pixels, values.shape)
-        if seen is not None and seen.element_px is not None:
+        if seen.element_px is not None:
             reach = float(np.clip(seen.element_px, 3.0, REACH))
     saturated = values >= SATURATED * full
     return PictureHealth(
@@ -170,7 +170,8 @@ def _shares(mask: NDArray[np.bool_], columns: int, rows: int) -> Array:
 def _hull(pixels: Array, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Return the pixels (h, w) between the points (n, 2)."""
     mask = np.zeros(shape, dtype=np.uint8)
-    cv2.fillConvexPoly(mask, cv2.convexHull(np.rint(pixels).astype(np.int32)), 1)
+    inside = np.clip(np.rint(pixels), 0, np.array(shape[::-1]) - 1)
+    cv2.fillConvexPoly(mask, cv2.convexHull(inside.astype(np.int32)), 1)
     return mask.astype(bool)
 
 

@@ -24,12 +24,23 @@ FLAT = radians(8)  # to the image plane
 FaultKind = Literal["dark", "faint", "over_exposed", "glare", "moving", "blurred", "small", "cut_off", "flat"]
 
 
+SPOILING: frozenset[FaultKind] = frozenset(
+    {"dark", "faint", "over_exposed", "glare", "moving", "blurred", "small"}
+)
+"""Faults that make every point of a picture worse; the others say only that it might tell more."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """One thing that is wrong with a picture, for programs and in a sentence that says what to do."""
 
     kind: FaultKind
     message: str
+
+    @property
+    def spoils(self) -> bool:
+        """Whether the points found in the picture are worse for it."""
+        return self.kind in SPOILING
 
 
 def faults(health: PictureHealth) -> list[Fault]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from calib.detection import detect
+from calib.detection import Detection, Fault, detect, faults, picture_health
 from calib.errors import DetectionError
+from calib.targets import Target
 from daemon.rig import Rig, RigSnapshot, Side
 from drivers.camera import Frame
 from drivers.errors import DeviceFaultError, MotionError
@@ -21,6 +22,8 @@ class Observation:
     readings: list[float]
     approached: list[Side]
     points: int
+    faults: tuple[Fault, ...]
+    """What is wrong with the picture all the same."""
     taken_at: datetime
     settled: float
     """Seconds of the rig's clock between the confirmed standstill and the exposure."""
@@ -70,14 +73,13 @@ class Observer:
         assert stood_at is not None
         frame = await self._rig.frame(after=clock.now())
         self._require_unmoved(settled, await self._standing())
-        detection = await asyncio.to_thread(detect, frame.image, self._rig.profile.target)
-        if len(detection.ids) == 0:
-            raise DetectionError("no point of the target was found in the picture")
+        detection, found = await asyncio.to_thread(_seen, frame, self._rig.profile.target)
         return Observation(
             frame=frame,
             readings=[position for position in settled.readings if position is not None],
             approached=list(settled.approached),
             points=len(detection.ids),
+            faults=found,
             taken_at=self._rig.utc.at(frame.timestamp),
             settled=frame.timestamp - stood_at,
         )
@@ -109,3 +111,10 @@ class Observer:
                     f"axis '{spec.name}' went from {earlier.position:g} to {later.position:g} {spec.unit} "
                     "while a picture was taken: it does not hold its position"
                 )
+
+
+def _seen(frame: Frame, target: Target) -> tuple[Detection, tuple[Fault, ...]]:
+    detection = detect(frame.image, target)
+    if len(detection.ids) == 0:
+        raise DetectionError("no point of the target was found in the picture")
+    return detection, tuple(faults(picture_health(frame.image, target, detection)))

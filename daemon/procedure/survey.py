@@ -32,6 +32,7 @@ class Survey:
         self._procedure = rig.profile.procedure
         self._positions = sum(1 for _ in self._procedure.planned_views())
         self._position = 0
+        self._told: set[str] = set()  # the kinds of faults that were told of in this sweep
 
     async def take(self) -> None:
         """Home what is not homed, then take every view.
@@ -58,6 +59,7 @@ class Survey:
     async def _sweep(self, sweep: Sweep) -> None:
         await self._checkpoint()
         self._log.add(JointStarted(joint=sweep.joint, views=len(sweep.readings), use=sweep.use))
+        self._told.clear()
         await self._observer.go(sweep.start)
         seen = 0
         for reading in sweep.readings:
@@ -71,6 +73,7 @@ class Survey:
     async def _free_views(self, views: tuple[FreeView, ...]) -> None:
         await self._checkpoint()
         self._log.add(JointStarted(joint=None, views=len(views)))
+        self._told.clear()
         for view in views:
             await self._view(view.readings, None, view.use)
 
@@ -84,7 +87,16 @@ class Survey:
         if observation is None:
             return False
         await self._store(observation, joint, use)
+        self._warn(observation)
         return True
+
+    def _warn(self, observation: Observation) -> None:
+        """Tell of a picture that is worse than it should be, of each kind of fault once a sweep."""
+        for fault in observation.faults:
+            if fault.spoils and fault.kind not in self._told:
+                self._told.add(fault.kind)
+                where = f"position {self._position} of {self._positions}"
+                self._log.add(Warned(message=f"{where} is measured all the same: {fault.message}"))
 
     async def _look_twice(self) -> Observation | None:
         try:

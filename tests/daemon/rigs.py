@@ -100,6 +100,7 @@ cy = "178 px"
 
 [simulation.camera.picture]
 frame_rate = "60 Hz"
+defocus = "{defocus}"
 """
 
 LOOKING_AT_THE_TARGET = '["14 mm", "52 mm", "0 mm"]'
@@ -114,6 +115,7 @@ def write_profile(
     look_at: str = LOOKING_AT_THE_TARGET,
     velocity: float = 100.0,
     max_reading_age: str = "2 s",
+    defocus: str = "0.5 px",
 ) -> Path:
     """Write the small rig's profile into `folder` and return the file."""
     path = folder / "small-rig.toml"
@@ -124,6 +126,7 @@ def write_profile(
             look_at=look_at,
             velocity=velocity,
             max_reading_age=max_reading_age,
+            defocus=defocus,
         ),
         encoding="utf-8",
     )

@@ -78,6 +78,21 @@ async def test_a_run_ends_with_an_active_calibration(
     assert load_calibration(folder / "calibration.json").method == "ml"
 
 
+async def test_a_sharp_run_has_no_warnings_and_a_blurred_one_has_one_a_sweep(tmp_path: Path) -> None:
+    for defocus, warned in (("0.5 px", 0), ("2.5 px", 3)):
+        (tmp_path / defocus).mkdir()
+        profile = small_rig(tmp_path / defocus, defocus=defocus)
+        async with running_service(profile, tmp_path / defocus / "data") as service:
+            _, events = await finish(service, await service.runs.start())
+        messages = [
+            event.message for event in of(events, "warning") if "measured all the same" in event.message
+        ]
+        assert len(messages) == warned
+        assert len(of(events, "view")) == 10
+        for message in messages:
+            assert "of 10 is measured all the same: the picture is blurred: edges are " in message
+
+
 async def test_a_view_says_how_it_was_taken(service: Service) -> None:
     run, _ = await finish(service, await service.runs.start())
     session = load_session(service.store.session_folder(run))
