@@ -15,10 +15,10 @@ CLEAR_OF_NOISE = 10.0  # times the noise, between ink and paper
 OVER_EXPOSED = 0.2  # of the region's pixels are saturated: paper, and not a reflection
 GLARE = 0.005  # of the region, in one patch
 BLURRED = 5.0  # px from 10 to 90 %
-SMEARED = 3.0  # px of motion, and
+SMEARED = 4.0  # px of motion, and
 SMEARED_RATIO = 1.5  # times as wide across it as along it
-FINEST = {"disk": 10.0, "square": 10.0, "marker cell": 4.0}  # px
-SMALLEST_AREA = 0.03  # of the picture
+FINEST = {"disk": 10.0, "square": 10.0, "marker cell": 3.0}  # px
+SMALLEST_AREA = 0.01  # of the picture
 FLAT = radians(8)  # to the image plane
 
 FaultKind = Literal["dark", "faint", "over_exposed", "glare", "moving", "blurred", "small", "cut_off", "flat"]
