@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.detection import Detection
-from calib.detection.disks import Centroid, Disk, disk_centroid
+from calib.detection.disks import Disks, disk_centroids
 from calib.detection.labelling import is_mirrored, upright
 from calib.detection.picture import Picture, copies, in_original
 from calib.detection.plane import view_of_plane
 from calib.errors import DetectionError
 from calib.targets import AsymmetricCircleGrid, CircleGrid, target_points
 
-SEARCHED_SIDE = 1280
+SEARCHED_SIDE = 480
 LARGEST_MISFIT = (
     0.25  # of the distance between disks: more than a lens bends a grid, less than a wrong order does
 )
@@ -45,15 +45,16 @@ def detect_circle_grid(picture: Picture, target: AnyCircleGrid) -> Detection:
 def _blobs(grey: NDArray[np.uint8]) -> Iterator[tuple[bool, NDArray[np.float32], float]]:
     """Look for blobs: whether light, centres (n, 2) in a copy of the picture, the copy's scale."""
     for searched, scale in copies(grey, SEARCHED_SIDE):
+        calm = cv2.GaussianBlur(searched, (3, 3), 0)  # noise frays outlines
         for light in (False, True):
-            blobs = _blob_detector(searched.size, light).detect(searched)
+            blobs = _blob_detector(searched.size, light).detect(calm)
             yield light, np.array([blob.pt for blob in blobs], dtype=np.float32).reshape(-1, 2), scale
 
 
 def _blob_detector(pixels: int, light: bool) -> cv2.SimpleBlobDetector:
     parameters = cv2.SimpleBlobDetector.Params()
     parameters.blobColor = 255 if light else 0
-    parameters.minThreshold, parameters.maxThreshold, parameters.thresholdStep = 20, 240, 15
+    parameters.minThreshold, parameters.maxThreshold, parameters.thresholdStep = 20, 240, 25
     parameters.minArea, parameters.maxArea = 12, pixels / 12
     parameters.minDistBetweenBlobs = 3
     parameters.filterByConvexity, parameters.minConvexity = True, 0.85
@@ -97,10 +98,11 @@ def _measured(
         shapes = radius * view.jacobians(plane)
         wide = 1 + np.maximum(LEAST_RIM, ROOM_FOR_BLUR / (radius * view.scales(plane)))
         clear = np.minimum(wide, target.spacing / target.disk_diameter)
-        disks = (Disk(*each, light) for each in zip(rough, shapes, clear, strict=True))
-        centroids = [centroid for disk in disks if (centroid := disk_centroid(picture, disk)) is not None]
-        if len(centroids) == len(plane):
-            return _detection(target, centroids)
+        centroids = disk_centroids(picture, Disks(rough, shapes, clear, light))
+        if centroids is not None:
+            reading = upright(target, centroids.pixels)
+            pixels, covariances = centroids.pixels[reading], centroids.covariances[reading]
+            return Detection(np.arange(len(pixels)), pixels, covariances, disk="centroid")
     return None
 
 
@@ -119,10 +121,3 @@ def _orders(centres: NDArray[np.float64], target: AnyCircleGrid) -> Iterator[NDA
             yield order
         elif target.rows % 2:
             yield order[::-1]
-
-
-def _detection(target: AnyCircleGrid, centroids: list[Centroid]) -> Detection:
-    pixels = np.array([centroid.pixel for centroid in centroids])
-    covariances = np.array([centroid.covariance for centroid in centroids])
-    reading = upright(target, pixels)
-    return Detection(np.arange(len(pixels)), pixels[reading], covariances[reading], disk="centroid")
