@@ -14,6 +14,7 @@ NAMES: Final = (
     "solve_time",
     "solve_growth",
     "detection_time",
+    "detection_accuracy",
     "pose_rate",
     "efficiency",
     "uncertainty",
@@ -33,7 +34,7 @@ def main(arguments: Sequence[str]) -> int:
             parser.error(f"there is no benchmark '{name}': choose from {', '.join(NAMES)}")
     if options.list:
         for name in NAMES:
-            say(f"{name:16}{_summary(_module(name))}")
+            say(f"{name:20}{_summary(_module(name))}")
         return 0
     for name in dict.fromkeys(options.names or NAMES):
         run(name, quick=options.quick)
