@@ -74,8 +74,8 @@ def run(*, quick: bool) -> dict[str, float]:
     figures: dict[str, float] = {}
     for target in TARGETS:
         rows = table(
-            target.kind, "scene, detector", "bias px", "scatter px", "rms px", "scatter / bound",
-            "error² / claimed", "missed", "false locks", "ms",
+            target.kind, "scene, detector", "bias px", "scatter px", "rms px", "/ bound",
+            "error² / claim", "missed", "false locks", "ms",
         )  # fmt: skip
         for name, scene in scenes.items():
             plate = SeenPlate(target, scene)

@@ -39,7 +39,7 @@ def peers(target: Printed) -> Mapping[str, Detector]:
         case Chessboard():
             return {
                 "findChessboardCornersSB": partial(_sectors, target=target),
-                "findChessboardCorners, cornerSubPix": partial(_quadrangles, target=target),
+                "findChessboardCorners": partial(_quadrangles, target=target),
             }
         case Charuco():
             return {"CharucoDetector": partial(_charuco, detector=_charuco_detector(target))}
