@@ -14,7 +14,7 @@ STEP = 0.5  # px between the samples of a profile
 MOST_EDGES = 2500
 FEWEST_EDGES = 30
 DIRECTIONS = 12
-FEWEST_IN_A_DIRECTION = 8
+FEWEST_IN_A_DIRECTION = 8, 0.05  # edges, and of all of them: corners have a few edges of any direction
 LEAST_STEP = 0.5  # of the region's contrast: ink against paper, and not a shadow
 CLEAR_OF_NOISE = 8.0  # times the noise: a step of less tells nothing of its width
 BOX_FROM_WIDTH = sqrt(12) / 2.563  # a Gaussian's edge is 2.563 deviations wide, a box has length / sqrt(12)
@@ -122,10 +122,11 @@ def _first_beyond(profiles: Array, level: float) -> Array:
 def _by_direction(widths: Array, directions: Array) -> Edges:
     """Fit squared widths as a blur's covariance has them: a + b cos 2t + c sin 2t, from each direction's median."""
     turned = np.floor(directions / pi * DIRECTIONS + 0.5).astype(int) % DIRECTIONS
+    fewest, share = FEWEST_IN_A_DIRECTION
     rows = []
     for one in range(DIRECTIONS):
         own = turned == one
-        if own.sum() >= FEWEST_IN_A_DIRECTION:
+        if own.sum() >= max(fewest, share * len(widths)):
             twice = 2 * directions[own]
             rows.append((np.cos(twice).mean(), np.sin(twice).mean(), np.median(widths[own]) ** 2))
     if not rows:

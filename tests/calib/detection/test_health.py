@@ -8,6 +8,7 @@ import pytest
 from drawn_targets import WALL, draw
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_detect_real_boards import LEFT, NACHI, pictures
 
 from calib.detection import detect, faults, picture_health
 from calib.detection.edges import measure_edges
@@ -221,3 +222,10 @@ def test_any_picture_has_health_in_numbers_and_words(shape, channels, deep, grai
 def test_a_ramp_has_no_edges():
     ramp = np.tile(np.linspace(20, 200, 640), (480, 1)).astype(np.float32)
     assert measure_edges(ramp, 1.0) is None
+
+
+@pytest.mark.parametrize(("folder", "board"), [("opencv-left", LEFT), ("nachi0117", NACHI)])
+def test_real_pictures_that_calibrate_well_are_neither_dark_nor_blurred_nor_moving(folder, board):
+    said = {kind for picture in pictures(folder) for kind in kinds(health_of(picture, board))}
+    # Both have reflections and paper as white as the camera goes, and views that lean little.
+    assert said <= {"glare", "over_exposed", "flat"}
