@@ -21,13 +21,12 @@ SMOOTHING = (
 STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-2)
 FIRST_LENGTH = 8.0  # px; of the edges, while the corners are known roughly
 SHORTEST, LONGEST = 2.0, 48.0  # px; of the edges: beyond, a bend is more than a parabola
-REACHED = 0.35
-"""Part of the distance to the next corner over which edges are fitted.
-
-With 0.45 drawings scatter by 13 % less; on a real board the two could not be told apart by more than chance.
-"""
-NEIGHBOURS_REACH = 2.0
-"""In standard deviations of the blur: neighbours look the same turned half way, and pull to neither side."""
+REACHED = (
+    0.35  # of the distance to the next corner; prints and lenses keep edges straight near the corner only
+)
+NEIGHBOURS_REACH = (
+    2.0  # standard deviations of the blur; they look the same turned half way, and pull to neither side
+)
 MOST_TURNED = 0.3  # radians; more is another thing
 UNMODELLED_VARIANCE = 0.002**2  # px²; the shape of the pixels and of the lens' blur
 UNMEASURED_VARIANCE = 0.5**2  # px²; where the drawing does not fit
