@@ -4,9 +4,8 @@ picture      what a camera gave, as grey values to search and to measure in
 circle_grid  symmetric and asymmetric grids of disks;  disks: their centroids on the grey values
 chessboard   its inner corners
 charuco      chessboard corners, numbered by markers;  corners: both kinds' corners on the grey values
-aprilgrid    corners of tags;  tag_outlines: the outlines that meet in them
-grey_fit     drawings fitted to grey values;  strips: the pixels along edges;  edge_profile: what blur makes of edges
-plane        how a flat target lies in the picture, and how a lens bends it
+aprilgrid    corners of tags;  tag_edges: the lines that cross in them
+plane        how a flat target lies in the picture
 labelling    which of a grid's readings is the target's
 detector     one call for all kinds
 health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do

@@ -8,18 +8,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.corners import measure_corners
+from calib.detection.corners import corner_covariances, refine_corners
 from calib.detection.detection import Detection
 from calib.detection.labelling import is_mirrored, upright
 from calib.detection.picture import Picture, copies, in_original
-from calib.detection.plane import view_of_plane
 from calib.errors import DetectionError
-from calib.targets import Chessboard, target_points
+from calib.targets import Chessboard
 
 SEARCHED_SIDE = 800
 MIDDLE, BESIDE_CORNER = 0.5, 0.15  # places in a square, in steps from corner to corner along both sides
 LEAST_CONTRAST = 0.15  # beside a corner, of that in the middle; disks have it in the middle alone
 LEAST_CHEQUERED = 0.9  # of the corners
+CLEAR_OF_NEIGHBOURS = 0.45  # of the distance to the next corners; beyond half of it, theirs are seen too
 
 
 def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
@@ -27,19 +27,15 @@ def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
     candidates = (grid[:, ::-1] if is_mirrored(grid) else grid for grid in _found(picture.grey, target))
     boards = (_with_colours_in_place(picture.grey, grid) for grid in candidates)
     grid = next((board for board in boards if board is not None), None)
-    not_found = DetectionError(
-        f"the chessboard of {target.rows} x {target.columns} inner corners was not found in the picture "
-        f"of {picture.size}: is the whole board in it, with a white rim, sharp and evenly lit?"
-    )
     if grid is None:
-        raise not_found
-    points = target_points(target)[:, :2]
-    rough = grid.reshape(-1, 2)
-    view = view_of_plane(points, rough)
-    if view is None:
-        raise not_found
-    pixels, covariances = measure_corners(picture, view, points, rough, target.pitch, target.pitch / 2)
+        raise DetectionError(
+            f"the chessboard of {target.rows} x {target.columns} inner corners was not found in the picture "
+            f"of {picture.size}: is the whole board in it, with a white rim, sharp and evenly lit?"
+        )
+    reaches = CLEAR_OF_NEIGHBOURS * _line_spacings(grid)
+    pixels = refine_corners(picture, grid.reshape(-1, 2), reaches)
     reading = upright(target, pixels)
+    covariances = corner_covariances(picture, pixels, reaches)
     return Detection(np.arange(len(pixels)), pixels[reading], covariances[reading], disk=None)
 
 
@@ -117,3 +113,12 @@ def _values(grey: NDArray[np.uint8], pixels: NDArray[np.float64]) -> NDArray[np.
     last = np.array(grey.shape[::-1]) - 1
     nearest = np.clip(np.rint(pixels), 0, last).astype(int)
     return np.asarray(grey[nearest[..., 1], nearest[..., 0]], dtype=np.float64)
+
+
+def _line_spacings(grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance (rows * columns,) in px from each corner to the nearer of the next lines through corners."""
+    along_columns: NDArray[np.float64] = np.gradient(grid, axis=0)
+    along_rows: NDArray[np.float64] = np.gradient(grid, axis=1)
+    area = along_rows[..., 0] * along_columns[..., 1] - along_rows[..., 1] * along_columns[..., 0]
+    longer = np.maximum(np.linalg.norm(along_rows, axis=-1), np.linalg.norm(along_columns, axis=-1))
+    return np.asarray((np.abs(area) / longer).ravel())
