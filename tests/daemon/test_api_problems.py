@@ -27,6 +27,7 @@ INSIDE = {
     daemon.PoseError,
     daemon.TargetUnseenError,  # ends a run, whose `error` it becomes
     daemon.ServeError,  # there is nobody yet to answer
+    daemon.PrintError,  # the command line alone prints
 }
 """Those that no request meets."""
 
