@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from drivers.clock import Clock
-from drivers.errors import DeviceFaultError, DeviceLostError
+from drivers.errors import DeviceLostError
 from drivers.simulated.faults import DeviceFault
 
 
@@ -69,10 +69,3 @@ class Device:
             )
         if not self._opened:
             raise DeviceLostError(f"axis '{axis}': the simulated controller is not open: open it first")
-
-    def require_no_alarm(self, axis: str) -> None:
-        """Raise DeviceFaultError while the device is in alarm."""
-        if self.fault == "alarm":
-            raise DeviceFaultError(
-                f"axis '{axis}': the simulated controller is in alarm: clear what caused it and home the axis"
-            )

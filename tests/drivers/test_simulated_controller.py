@@ -108,6 +108,16 @@ async def test_a_stalled_axis_is_reported_where_it_stands() -> None:
     await controller.close()
 
 
+async def test_a_stalled_homing_leaves_the_axis_unhomed() -> None:
+    controller = make({"power_up_position": "-90 mm", "home_position": "90 mm"})
+    await controller.open()
+    controller.inject("stall", "slide")
+    with pytest.raises(MotionError, match=r"axis 'slide' stands at 0 mm and was sent to 90 mm"):
+        await controller.axes["slide"].home()
+    assert not (await controller.axes["slide"].read()).homed
+    await controller.close()
+
+
 async def test_a_motion_that_never_ends_times_out_and_is_stopped() -> None:
     controller = await homed()
     controller.inject("hang", "slide")
