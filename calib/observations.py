@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection import detect
+from calib.detection import detect_in_all
 from calib.errors import DetectionError, ImageError, UnsolvableError
 from calib.picture_file import load_picture
 from calib.session import Session, View
@@ -44,10 +44,10 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A session's observations, and a sentence for each view that gave none."""
+    """A session's observations, and a sentence for each view that gave none, or whose frames disagree."""
 
     observations: list[Observation]
-    missing: list[str]
+    warnings: list[str]
 
     def of(self, views: set[int]) -> list[Observation]:
         """Return the observations of these views."""
@@ -59,38 +59,47 @@ def observe(
 ) -> Observed:
     """Return what each view measured, or those of places `only`, finding the target in its picture.
 
-    A picture in which the target is not found is left out and named. Raises ImageError for a picture that
-    is missing or unreadable, and UnsolvableError where no view shows the target or there are no views at
-    all.
+    Several frames of a view are averaged. A picture in which the target is not found is left out and named. Raises
+    ImageError for a picture that is missing or unreadable, and UnsolvableError where no view shows the target or
+    there are no views at all.
     """
     if not session.views:
         raise UnsolvableError("the session has no views: take some before solving it")
-    observations, missing = [], []
+    observations: list[Observation] = []
+    warnings: list[str] = []
     wanted = range(len(session.views)) if only is None else only
     for count, index in enumerate(wanted, start=1):
         view = session.views[index]
         if progress is not None and view.image is not None:
             progress(f"looking for the target in view {count} of {len(wanted)}")
         try:
-            observations.append(_observation(session, index, view))
+            observation, warning = _observation(session, index, view)
         except DetectionError as error:
-            missing.append(f"view {index} ({view.image}): {error}")
+            warnings.append(f"view {index} ({view.image}): {error}")
+            continue
+        observations.append(observation)
+        if warning is not None:
+            warnings.append(f"view {index} ({view.image}): {warning}")
     if not observations:
-        raise UnsolvableError(f"the target was not found in any of the {len(wanted)} views: {missing[0]}")
-    return Observed(observations, missing)
+        raise UnsolvableError(f"the target was not found in any of the {len(wanted)} views: {warnings[0]}")
+    return Observed(observations, warnings)
 
 
-def _observation(session: Session, index: int, view: View) -> Observation:
+def _observation(session: Session, index: int, view: View) -> tuple[Observation, str | None]:
+    """Return what a view measured, and what is to be said about its frames, if anything."""
     camera = session.camera_index(view)
     if view.world_from_camera is not None:
         nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
-        return Observation(index, camera, *nothing, disk=False, pose=rigid(view.world_from_camera))
+        pose = rigid(view.world_from_camera)
+        return Observation(index, camera, *nothing, disk=False, pose=pose), None
     if view.points is not None:
         ids = np.array(view.points.ids, dtype=np.int64)
         pixels = np.array(view.points.pixels, dtype=float).reshape(-1, 2)
-        return Observation(index, camera, ids, pixels, disk=view.points.disk == "centroid")
-    detection = detect(read_picture(session, view), session.target)
-    return Observation(
+        return Observation(index, camera, ids, pixels, disk=view.points.disk == "centroid"), None
+    pictures = (_picture(session, name) for name in view.frames)
+    averaged = detect_in_all(pictures, session.target)
+    detection = averaged.detection
+    observation = Observation(
         view=index,
         camera=camera,
         ids=detection.ids,
@@ -98,12 +107,12 @@ def _observation(session: Session, index: int, view: View) -> Observation:
         disk=detection.disk == "centroid",
         covariances=detection.covariances,
     )
+    return observation, averaged.warning
 
 
-def read_picture(session: Session, view: View) -> NDArray[np.generic]:
-    """Return the view's picture as it is on disk; raises ImageError that names the file."""
-    assert view.image is not None
+def _picture(session: Session, name: str) -> NDArray[np.generic]:
+    """Return a picture as it is on disk; raises ImageError that names the file."""
     try:
-        return load_picture(session.folder / view.image)
+        return load_picture(session.folder / name)
     except ImageError as error:
         raise ImageError(f"{error}, or take its view out of session.json") from error

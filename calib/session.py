@@ -184,16 +184,25 @@ class Points(Document):
 
 
 class View(Document):
-    """One measurement: the readings, and a picture, its detected points, or a camera pose."""
+    """One measurement: the readings, and a picture, its detected points, or a camera pose.
+
+    `images` are all frames of a view that took several, its `image` first.
+    """
 
     joint: str | None
     readings: list[Number]
     image: str | None = None
+    images: list[str] | None = None
     points: Points | None = None
     world_from_camera: RigidRows | None = None
     camera: str | None = None
     use: Literal["fit", "verify"] = "fit"
     approached: list[Literal[-1, 0, 1]] | None = None
+
+    @property
+    def frames(self) -> list[str]:
+        """The paths of the view's pictures, none where it has no picture."""
+        return self.images or ([] if self.image is None else [self.image])
 
     @field_validator("image")
     @classmethod
@@ -202,12 +211,23 @@ class View(Document):
             raise ValueError(f"'{image}' must be a path inside the session's folder")
         return image
 
+    @field_validator("images")
+    @classmethod
+    def _all_inside_the_folder(cls, images: list[str] | None) -> list[str] | None:
+        for image in images or []:
+            cls._inside_the_folder(image)
+            if (images or []).count(image) > 1:
+                raise ValueError(f"'{image}' stands twice: each frame has a picture of its own")
+        return images
+
     @model_validator(mode="after")
     def _one_measurement(self) -> Self:
         given = [key for key in ("image", "points", "world_from_camera") if getattr(self, key) is not None]
         if len(given) != 1:
             found = " and ".join(given) or "none"
             raise ValueError(f"must carry one of image, points or world_from_camera, and has {found}")
+        if self.images is not None and self.images[:1] != [self.image]:
+            raise ValueError("images must begin with the view's image, and go on with its further frames")
         return self
 
 

@@ -1,5 +1,6 @@
 """Writing a session view by view, so that a crash loses at most the view in flight."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,18 +38,22 @@ class SessionWriter:
         write_json(self.folder / "session.json", done)
         self.session = done
 
-    def add_picture(self, picture: Picture, **fields: Any) -> View:
-        """Put one more view on disk, `picture` first; `fields` are the view's keys beside `image`.
+    def add_pictures(self, pictures: Sequence[Picture], **fields: Any) -> View:
+        """Put one more view on disk, its `pictures` (one or more) first; `fields` are its keys beside them.
 
         Raises ImageError for a picture that cannot be stored and OSError when the disk does not take it; the
         session is then as it was.
         """
-        name = f"frames/{len(self.session.views):04d}.png"
-        view = View(image=name, **fields)
-        done, data = cv2.imencode(".png", picture)
-        if not done:
-            raise ImageError(f"{self.folder / name}: the picture could not be encoded as PNG")
-        write_durably(self.folder / name, data.tobytes())
+        number = len(self.session.views)
+        names = [f"frames/{number:04d}{f'-{frame}' if frame else ''}.png" for frame in range(len(pictures))]
+        if len(names) > 1:
+            fields["images"] = names
+        view = View(image=names[0], **fields)
+        for name, picture in zip(names, pictures, strict=True):
+            done, data = cv2.imencode(".png", picture)
+            if not done:
+                raise ImageError(f"{self.folder / name}: the picture could not be encoded as PNG")
+            write_durably(self.folder / name, data.tobytes())
         return self.add(view)
 
 

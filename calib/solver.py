@@ -60,7 +60,7 @@ def solve(
             warnings += lens_in_words(camera.name, std)
     points = target_points(session.target)
     warnings += [*left_out_in_words(solution), *unused_warp_in_words(solution.unused_warp, points)]
-    warnings += observed.missing
+    warnings += observed.warnings
     calibration = document(session, method, solution, Quality())
     known = session.approached_from(solution.sides)
     quality = judged(calibration, known, observed.observations, solution, warnings)

@@ -113,7 +113,7 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
         rotation_rad=_spread([residual.rotation for residual in residuals]),
         per_view=[_verdict(session, residual) for residual in residuals],
         travel=_travels(calibration, session, residuals) if placed else [],
-        warnings=observed.missing,
+        warnings=observed.warnings,
     )
 
 

@@ -71,6 +71,7 @@ class ProcedureDocument(BaseModel):
     settle_s: float
     max_reading_age_s: float
     frame_timeout_s: float
+    frames: int = Field(description="Pictures at each position, which are averaged.")
     sweeps: list[SweepDocument]
     views: list[FreeViewDocument]
 
@@ -143,6 +144,7 @@ def _procedure(profile: Profile) -> ProcedureDocument:
         settle_s=procedure.settle,
         max_reading_age_s=procedure.max_reading_age,
         frame_timeout_s=procedure.frame_timeout,
+        frames=procedure.frames,
         sweeps=[
             SweepDocument(
                 joint=sweep.joint, start=dict(sweep.start), readings=list(sweep.readings), use=sweep.use

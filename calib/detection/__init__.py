@@ -7,11 +7,12 @@ charuco      chessboard corners, numbered by markers;  corners: both kinds' corn
 aprilgrid    corners of tags;  tag_edges: the lines that cross in them
 plane        how a flat target lies in the picture
 labelling    which of a grid's readings is the target's
-detector     one call for all kinds
+detector     one call for all kinds;  averaging  over several frames of one view
 health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do
 inspection   both at once
 """
 
+from calib.detection.averaging import Averaged, detect_in_all
 from calib.detection.detection import Detection
 from calib.detection.detector import detect
 from calib.detection.health import PictureHealth, picture_health
@@ -19,11 +20,13 @@ from calib.detection.health_in_words import Fault, faults
 from calib.detection.inspection import Inspection, inspect
 
 __all__ = [
+    "Averaged",
     "Detection",
     "Fault",
     "Inspection",
     "PictureHealth",
     "detect",
+    "detect_in_all",
     "faults",
     "inspect",
     "picture_health",

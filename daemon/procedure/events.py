@@ -61,7 +61,7 @@ class Moving(Event):
 
 
 class ViewTaken(Event):
-    """A picture in which the target was found is on disk."""
+    """A picture in which the target was found is on disk, or several of one view."""
 
     type: Literal["view"] = "view"
     position: int
@@ -71,6 +71,7 @@ class ViewTaken(Event):
     use: Use
     readings: list[float]
     points: Annotated[int, Field(description="Target points found in it.")]
+    frames: Annotated[int, Field(description="Frames in which they were found, and averaged.")] = 1
     image: Annotated[str, Field(description="Its path in the session's folder.")]
 
 

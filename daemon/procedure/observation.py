@@ -1,12 +1,13 @@
-"""One view: go there, stand, settle, take a frame exposed after that, and find the target in it."""
+"""One view: go there, stand, settle, take frames exposed after that, and find the target in them."""
 
 import asyncio
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from calib.detection import Detection, Fault, detect, faults, picture_health
+from calib.detection import Averaged, Fault, detect_in_all, faults, picture_health
 from calib.errors import DetectionError
 from calib.targets import Target
 from daemon.rig import Rig, RigSnapshot, Side
@@ -16,25 +17,25 @@ from drivers.errors import DeviceFaultError, MotionError
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """A picture in which the target was found, and the readings (chain order) at which it was taken."""
+    """Frames in which the target was found, and the readings (chain order) at which they were taken."""
 
-    frame: Frame
+    frames: list[Frame]
     readings: list[float]
     approached: list[Side]
-    points: int
+    seen: Averaged
     faults: tuple[Fault, ...]
-    """What is wrong with the picture all the same."""
+    """What is wrong with the first frame all the same."""
     taken_at: datetime
     settled: float
-    """Seconds of the rig's clock between the confirmed standstill and the exposure."""
+    """Seconds of the rig's clock between the confirmed standstill and the first exposure."""
 
     def view_fields(self) -> dict[str, Any]:
-        """Return what the view keeps of it beside the picture."""
+        """Return what the view keeps of it beside the pictures."""
         return {
             "readings": self.readings,
             "approached": self.approached,
             "time": self.taken_at.isoformat(timespec="milliseconds").replace("+00:00", "Z"),
-            "settle": {"settled_s": self.settled, "exposure_s": self.frame.exposure},
+            "settle": {"settled_s": self.settled, "exposure_s": self.frames[0].exposure},
         }
 
 
@@ -61,9 +62,9 @@ class Observer:
                 )
 
     async def look(self) -> Observation:
-        """Wait until the rig has settled, take a frame, and find the target in it.
+        """Wait until the rig has settled, take the frames, and find the target in them.
 
-        Raises DetectionError where the target is not found, MotionError where an axis moves meanwhile, and
+        Raises DetectionError where the target is found in none, MotionError where an axis moves meanwhile, and
         what `Rig.frame` raises.
         """
         clock = self._rig.clock
@@ -71,18 +72,26 @@ class Observer:
         await clock.sleep(self._rig.profile.procedure.settle)
         settled = await self._standing()
         assert stood_at is not None
-        frame = await self._rig.frame(after=clock.now())
+        frames = await self._frames(after=clock.now())
         self._require_unmoved(settled, await self._standing())
-        detection, found = await asyncio.to_thread(_seen, frame, self._rig.profile.target)
+        seen, found = await asyncio.to_thread(_seen, frames, self._rig.profile.target)
         return Observation(
-            frame=frame,
+            frames=frames,
             readings=[position for position in settled.readings if position is not None],
             approached=list(settled.approached),
-            points=len(detection.ids),
+            seen=seen,
             faults=found,
-            taken_at=self._rig.utc.at(frame.timestamp),
-            settled=frame.timestamp - stood_at,
+            taken_at=self._rig.utc.at(frames[0].timestamp),
+            settled=frames[0].timestamp - stood_at,
         )
+
+    async def _frames(self, after: float) -> list[Frame]:
+        """Return as many frames as the profile asks for, one after the other."""
+        frames: list[Frame] = []
+        for _ in range(self._rig.profile.procedure.frames):
+            frames.append(await self._rig.frame(after))
+            after = math.nextafter(frames[-1].timestamp, math.inf)
+        return frames
 
     async def _standing(self) -> RigSnapshot:
         """Return a fresh snapshot in which every axis knows where it is, and stands.
@@ -113,8 +122,8 @@ class Observer:
                 )
 
 
-def _seen(frame: Frame, target: Target) -> tuple[Detection, tuple[Fault, ...]]:
-    detection = detect(frame.image, target)
-    if len(detection.ids) == 0:
+def _seen(frames: list[Frame], target: Target) -> tuple[Averaged, tuple[Fault, ...]]:
+    seen = detect_in_all((frame.image for frame in frames), target)
+    if len(seen.detection.ids) == 0:
         raise DetectionError("no point of the target was found in the picture")
-    return detection, tuple(faults(picture_health(frame.image, target, detection)))
+    return seen, tuple(faults(picture_health(frames[0].image, target, seen.detection)))

@@ -91,12 +91,15 @@ class Survey:
         return True
 
     def _warn(self, observation: Observation) -> None:
-        """Tell of a picture that is worse than it should be, of each kind of fault once a sweep."""
-        for fault in observation.faults:
-            if fault.spoils and fault.kind not in self._told:
-                self._told.add(fault.kind)
+        """Tell of pictures that are worse than they should be, of each kind of fault once a sweep."""
+        found: dict[str, str] = {fault.kind: fault.message for fault in observation.faults if fault.spoils}
+        if observation.seen.warning is not None:
+            found["frames"] = observation.seen.warning
+        for kind, message in found.items():
+            if kind not in self._told:
+                self._told.add(kind)
                 where = f"position {self._position} of {self._positions}"
-                self._log.add(Warned(message=f"{where} is measured all the same: {fault.message}"))
+                self._log.add(Warned(message=f"{where} is measured all the same: {message}"))
 
     async def _look_twice(self) -> Observation | None:
         try:
@@ -113,8 +116,10 @@ class Survey:
     async def _store(self, observation: Observation, joint: str | None, use: Use) -> None:
         fields: dict[str, Any] = {"joint": joint, "use": use, **observation.view_fields()}
         # Finished even when cancelled, so that what the writer holds is what is on disk.
-        picture = cast("Picture", observation.frame.image)  # a camera's contract: 8 or 16 bits
-        view = await finish(asyncio.to_thread(self._writer.add_picture, picture, **fields))
+        pictures = [
+            cast("Picture", frame.image) for frame in observation.frames
+        ]  # a camera's are 8 or 16 bits
+        view = await finish(asyncio.to_thread(self._writer.add_pictures, pictures, **fields))
         assert view.image is not None
         self._log.add(
             ViewTaken(
@@ -124,7 +129,8 @@ class Survey:
                 joint=joint,
                 use=use,
                 readings=observation.readings,
-                points=observation.points,
+                points=len(observation.seen.detection.ids),
+                frames=observation.seen.frames,
                 image=view.image,
             )
         )

@@ -55,6 +55,8 @@ class Procedure:
     max_reading_age: float
     """Older readings are not served as a pose."""
     frame_timeout: float
+    frames: int
+    """How many are taken at each position, and averaged."""
     sweeps: tuple[Sweep, ...]
     views: tuple[FreeView, ...]
 
@@ -81,7 +83,14 @@ def resolve_procedure(table: ProcedureTable, axes: list[AxisProfile], problems: 
     for index, view in enumerate(table.views):
         path = ("procedure", "views", index)
         views.append(FreeView(_readings(view.readings, (*path, "readings"), specs, problems), view.use))
-    return Procedure(table.settle, table.max_reading_age, table.frame_timeout, tuple(sweeps), tuple(views))
+    return Procedure(
+        settle=table.settle,
+        max_reading_age=table.max_reading_age,
+        frame_timeout=table.frame_timeout,
+        frames=table.frames,
+        sweeps=tuple(sweeps),
+        views=tuple(views),
+    )
 
 
 def _sweep(table: SweepTable, path: KeyPath, specs: Mapping[str, AxisSpec], problems: Problems) -> Sweep:

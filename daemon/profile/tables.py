@@ -147,6 +147,7 @@ class ProcedureTable(Table):
         "1 s"
     )
     frame_timeout: PositiveDuration = written("5 s")
+    frames: Annotated[int, Field(ge=1, le=64, description="How many are averaged at each position.")] = 1
     sweeps: list[SweepTable] = []
     views: list[ViewTable] = []
 

@@ -35,6 +35,10 @@ def view(**changes: Any) -> dict[str, Any]:
     return {"joint": "pan", "readings": [1.0, 2.0], "world_from_camera": IDENTITY, **changes}
 
 
+def picture(**changes: Any) -> dict[str, Any]:
+    return view(world_from_camera=None, image="a.png", **changes)
+
+
 def written(folder: Path, value: Any) -> Path:
     (folder / "session.json").write_text(json.dumps(value))
     return folder
@@ -69,6 +73,11 @@ def test_unknown_keys_are_kept(tmp_path: Path) -> None:
         ({"views": [view(approached=[1])]}, r"views\[0\]\.approached: has 1 numbers for 2 joints"),
         ({"views": [view(world_from_camera=None)]}, r"views\[0\]: must carry one of image, points"),
         ({"views": [view(image="a.png")]}, r"views\[0\]: must carry one of .* image and world_from_camera"),
+        ({"views": [picture(images=["b.png", "a.png"])]}, r"views\[0\]: images must begin with the view's image"),
+        ({"views": [picture(images=[])]}, r"views\[0\]: images must begin with the view's image"),
+        ({"views": [view(images=["a.png"])]}, r"views\[0\]: images must begin with the view's image"),
+        ({"views": [picture(images=["a.png", "/b.png"])]}, r"images: '/b.png' must be a path inside"),
+        ({"views": [picture(images=["a.png", "a.png"])]}, r"images: 'a.png' stands twice"),
         ({"views": [view(world_from_camera=[[2, 0, 0, 0], *IDENTITY[1:]])]}, "is not a rotation"),
         ({"views": [view(world_from_camera=IDENTITY[:3])]}, "must be a 4 x 4 matrix"),
         ({"views": [view(world_from_camera=None, image="../a.png")]}, "inside the session's folder"),
@@ -145,7 +154,7 @@ def test_every_view_is_on_disk_when_it_is_added(tmp_path: Path) -> None:
     writer = SessionWriter(tmp_path, Session.model_validate(document(views=[])))
     picture = np.random.default_rng(0).integers(0, 255, (480, 640), dtype=np.uint8)
     for step in range(3):
-        added = writer.add_picture(picture + step, joint="slide", readings=[float(step), 0.0], note="wet")
+        added = writer.add_pictures([picture + step], joint="slide", readings=[float(step), 0.0], note="wet")
         stored = load_session(tmp_path)
         assert stored.views[-1] == added
         assert stored.views[-1].readings == [step, 0.0]
@@ -155,6 +164,23 @@ def test_every_view_is_on_disk_when_it_is_added(tmp_path: Path) -> None:
     writer.add(View.model_validate(view()))
     assert len(load_session(tmp_path).views) == 4
     assert not list(tmp_path.rglob("*.tmp"))
+
+
+def test_all_frames_of_a_view_are_on_disk_and_a_lost_one_is_named(tmp_path: Path) -> None:
+    writer = SessionWriter(tmp_path, Session.model_validate(document(views=[])))
+    frames = list(np.random.default_rng(0).integers(0, 255, (3, 480, 640), dtype=np.uint8))
+    writer.add_pictures(frames[:1], joint=None, readings=[0.0, 0.0])
+    writer.add_pictures(frames, joint=None, readings=[0.0, 0.0])
+    one, several = load_session(tmp_path).views
+    assert one.images is None
+    assert one.frames == ["frames/0000.png"]
+    assert several.image == "frames/0001.png"
+    assert several.frames == ["frames/0001.png", "frames/0001-1.png", "frames/0001-2.png"]
+    for frame, name in zip(frames, several.frames, strict=True):
+        assert np.array_equal(cv2.imread(str(tmp_path / name), cv2.IMREAD_GRAYSCALE), frame)
+    (tmp_path / "frames" / "0001-2.png").unlink()
+    with pytest.raises(ImageError, match=r"frames/0001-2\.png: the picture is missing"):
+        observe(load_session(tmp_path), only=[1])
 
 
 def test_a_view_that_cannot_be_written_leaves_the_session_as_it_was(
@@ -169,6 +195,6 @@ def test_a_view_that_cannot_be_written_leaves_the_session_as_it_was(
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space left"):
-        writer.add_picture(np.zeros((4, 4), np.uint8), joint=None, readings=[0.0, 0.0])
+        writer.add_pictures([np.zeros((4, 4), np.uint8)], joint=None, readings=[0.0, 0.0])
     assert (tmp_path / "session.json").read_bytes() == before
     assert len(writer.session.views) == 1

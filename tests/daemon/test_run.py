@@ -3,7 +3,7 @@
 import asyncio
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from calib import load_calibration, load_session
-from calib.detection import Detection, detect
+from calib.detection import Averaged, detect_in_all
 from calib.errors import DetectionError, UnsolvableError
 from calib.targets import Target
 from daemon.errors import (
@@ -34,8 +34,6 @@ from daemon.store import RunRecord, RunState
 from drivers.simulated import SimulatedController
 from tests.daemon.motions import until
 from tests.daemon.rigs import LOOKING_AWAY, small_rig
-
-Look = Callable[[NDArray[Any], Target], Detection]
 
 
 async def finish(service: Service, run: RunRecord) -> tuple[RunRecord, list[RunEvent]]:
@@ -297,12 +295,12 @@ class TestATargetHardToSee:
         def be_blind(at: set[int]) -> None:
             looks = iter(range(1, 1000))
 
-            def look(image: NDArray[Any], target: Target) -> Detection:
+            def look(images: Iterable[NDArray[Any]], target: Target) -> Averaged:
                 if next(looks) in at:
                     raise DetectionError("somebody stood in front of it")
-                return detect(image, target)
+                return detect_in_all(images, target)
 
-            monkeypatch.setattr("daemon.procedure.observation.detect", look)
+            monkeypatch.setattr("daemon.procedure.observation.detect_in_all", look)
 
         return be_blind
 
@@ -385,7 +383,7 @@ async def test_an_error_in_the_program_fails_the_run_too(
     def look(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("daemon.procedure.observation.detect", look)
+    monkeypatch.setattr("daemon.procedure.observation.detect_in_all", look)
     run, _ = await finish(service, await service.runs.start())
     assert run.state is RunState.FAILED
     assert "ZeroDivisionError" in (run.error or "")
