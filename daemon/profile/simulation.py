@@ -1,4 +1,4 @@
-"""Checks that a profile's `[simulation]` is there when a simulated device needs it, and fits the rig."""
+"""Checks that a profile's `[simulation]` is there when a device needs it, and fits the rig."""
 
 from typing import Any, Final
 
@@ -7,6 +7,7 @@ from daemon.profile.axes import AxisProfile
 from daemon.profile.problems import Problems
 from daemon.profile.tables import ProfileTable
 from drivers.clock import SystemClock
+from drivers.emulators.registry import has_emulator
 from drivers.errors import OptionsError
 
 SIMULATED: Final = "simulated"
@@ -22,13 +23,22 @@ def check_simulation(
     ]
     named.append((("camera", "driver"), table.camera.driver))
     simulated = [path for path, driver in named if driver == SIMULATED]
+    emulated = [path for path, driver in named if has_emulator(path[0], driver)]
     if table.simulation is None:
         for path in simulated[:1]:
             problems.add(path, "a simulated device needs the table [simulation]")
         return
-    if not simulated:
-        problems.add(("simulation",), "no device is simulated: remove the table, or use driver = 'simulated'")
+    if not simulated and not emulated:
+        problems.add(
+            ("simulation",),
+            "no device is simulated, or has an emulator: remove the table, or use driver = 'simulated'",
+        )
         return
+    if len(simulated) < len(named) and table.simulation.time_scale != 1:
+        problems.add(
+            ("simulation", "time_scale"),
+            "real drivers keep the pace of life, and so do emulators: remove it",
+        )
     joints = len(table.simulation.joints)
     if joints != len(table.axes):
         problems.add(

@@ -46,7 +46,9 @@ def _context(profile: Profile) -> DriverContext:
         return DriverContext(SystemClock())
     from drivers.simulated.world import SimulatedWorld
 
-    clock = ScaledClock(profile.simulation.time_scale)
+    scale = profile.simulation.time_scale
+    # Drivers of real devices, which may be emulated elsewhere, stamp what they see by the system's clock.
+    clock = SystemClock() if scale == 1.0 else ScaledClock(scale)
     specs = [axis.spec for axis in profile.axes]
     target = profile.target.model_dump()
     return DriverContext(clock, SimulatedWorld(profile.simulation, specs, target, clock))

@@ -86,7 +86,13 @@ class TestOtherPackagesDrivers:
 
     def test_a_simulation_needs_a_simulated_device(self, problems: Problems) -> None:
         assert problems(self.CONTROLLER, self.AXIS, self.CAMERA) == [
-            "68: simulation: no device is simulated: remove the table, or use driver = 'simulated'"
+            "68: simulation: no device is simulated, or has an emulator: remove the table, "
+            "or use driver = 'simulated'"
+        ]
+
+    def test_real_devices_keep_the_pace_of_life(self, problems: Problems) -> None:
+        assert problems(self.CONTROLLER, self.AXIS, ("[simulation]", "[simulation]\ntime_scale = 2.0")) == [
+            "68: simulation.time_scale: real drivers keep the pace of life, and so do emulators: remove it"
         ]
 
     def test_their_options_are_checked_by_themselves(self, problems: Problems) -> None:
