@@ -8,6 +8,7 @@ aprilgrid    corners of tags;  tag_edges: the lines that cross in them
 plane        how a flat target lies in the picture
 labelling    which of a grid's readings is the target's
 detector     one call for all kinds;  averaging  over several frames of one view
+tracking     measuring where the target is expected;  marks, lattice: what is to be seen there, and beyond
 health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do
 inspection   both at once
 """
@@ -18,6 +19,7 @@ from calib.detection.detector import detect
 from calib.detection.health import PictureHealth, picture_health
 from calib.detection.health_in_words import Fault, faults
 from calib.detection.inspection import Inspection, inspect
+from calib.detection.tracking import Prediction, track
 
 __all__ = [
     "Averaged",
@@ -25,9 +27,11 @@ __all__ = [
     "Fault",
     "Inspection",
     "PictureHealth",
+    "Prediction",
     "detect",
     "detect_in_all",
     "faults",
     "inspect",
     "picture_health",
+    "track",
 ]

@@ -71,12 +71,19 @@ class Ellipses:
         return Ellipses(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
-def fit(start: Ellipses, edges: Samples, plain: Samples) -> tuple[Ellipses, Array]:
-    """Fit ellipses to pixels near their `edges`, and their light to the `plain` paper and ink as well.
+class Fitted(NamedTuple):
+    """Ellipses, the covariances (n, 2, 2) of their centres (px²), and the variances (n,) left of the grey values.
 
-    Gives the ellipses, and the covariances (n, 2, 2) of their centres in px², from the scatter that each fit
-    leaves.
+    The covariances are of the scatter that each fit leaves.
     """
+
+    ellipses: Ellipses
+    covariances: Array
+    variances: Array
+
+
+def fit(start: Ellipses, edges: Samples, plain: Samples) -> Fitted:
+    """Fit ellipses to pixels near their `edges`, and their light to the `plain` paper and ink as well."""
     ellipses = start
     inside = (start.distances(plain.x, plain.y) > 0).astype(np.float32)
     for _ in range(MOST_STEPS):
@@ -88,7 +95,7 @@ def fit(start: Ellipses, edges: Samples, plain: Samples) -> tuple[Ellipses, Arra
             break
     counts = np.count_nonzero(edges.weights, axis=1) + np.count_nonzero(plain.weights, axis=1)
     variances = equations.squares / np.maximum(counts - PARAMETERS, 1)
-    return ellipses, inverses[:, CENTRE, CENTRE] * variances[:, None, None]
+    return Fitted(ellipses, inverses[:, CENTRE, CENTRE] * variances[:, None, None], variances)
 
 
 @dataclass(frozen=True, eq=False)

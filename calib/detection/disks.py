@@ -59,7 +59,7 @@ def disk_centroids(picture: Picture, disks: Disks) -> Centroids | None:
             edges, plain = _shared_out(picture, ellipses, blocks, most_thinned)
             if np.any(np.count_nonzero(edges.weights, axis=1) < FEWEST_PIXELS):
                 return None
-            ellipses, covariances = fit(ellipses, edges, plain)
+            ellipses, covariances, _ = fit(ellipses, edges, plain)
         if not _are_disks(picture, disks, ellipses):
             return None
     return Centroids(disks.centres + ellipses.centres, covariances + UNMODELLED_VARIANCE * np.eye(2))
