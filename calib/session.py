@@ -325,7 +325,8 @@ class Session(Document):
 
     def readings(self) -> NDArray[np.float64]:
         """Return the readings of all views (n, m)."""
-        return np.array([view.readings for view in self.views], dtype=float).reshape(len(self.views), -1)
+        values = [view.readings for view in self.views]
+        return np.array(values, dtype=float).reshape(len(self.views), len(self.joints))
 
     def approached_from(self, sides: NDArray[np.float64] | None) -> Self:
         """Return this session with `sides` (n, m) as of `sides`, as it was for None."""
@@ -342,7 +343,7 @@ class Session(Document):
         """Return from which side each joint came to each view's readings (n, m): +1, -1, or 0 where not known."""
         nowhere = [0] * len(self.joints)
         sides = np.array([view.approached or nowhere for view in self.views], dtype=float)
-        return sides.reshape(len(self.views), -1)
+        return sides.reshape(len(self.views), len(self.joints))
 
     @model_validator(mode="after")
     def _names_and_sizes_agree(self) -> Self:

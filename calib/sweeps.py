@@ -22,13 +22,38 @@ def sweep_labels(readings: Array, exercised: Ints, cameras: Ints, links: Sequenc
     labels = np.full(readings.shape, -1, dtype=np.intp)
     if not len(readings):
         return labels
-    spans = np.ptp(readings, axis=0)
+    spans = reading_spans(readings, exercised)
     reach = np.asarray(links)[cameras]
     for joint in range(readings.shape[1]):
         own = np.flatnonzero((exercised == joint) & (reach > joint))
         idle = np.delete(readings[own] / np.where(spans > 0, spans, 1), joint, axis=1)
         labels[own, joint] = _starts(np.column_stack([idle, cameras[own]]), readings[own, joint])
     return labels
+
+
+def reading_spans(readings: Array, exercised: Ints) -> Array:
+    """Return how far apart each joint's readings (n, m) lie (m,): infinitely, where they are one place's noise.
+
+    `readings` and `exercised` are as for `sweep_labels`, in the order in which they were taken. Only a joint that no
+    view exercises can have been in one place all the time: then no gap between its readings stands out.
+    """
+    spans = np.ptp(readings, axis=0) if len(readings) else np.zeros(readings.shape[1])
+    for joint in range(readings.shape[1]):
+        if spans[joint] > 0 and not (exercised == joint).any() and _in_one_place(readings[:, joint]):
+            spans[joint] = np.inf
+    return spans
+
+
+def _in_one_place(values: Array) -> bool:
+    """Return whether the largest gap between `values` (n,) is of the kind that noise leaves, too."""
+    ordered = np.sort(values)
+    largest = int(np.argmax(np.diff(ordered)))
+    below, above = ordered[: largest + 1], ordered[largest + 1 :]
+    noise = max(np.ptp(below), np.ptp(above))
+    if noise == 0:
+        # Two values alone: an axis goes from one to the other once, and noise goes back and forth.
+        return int(np.count_nonzero(np.diff(values))) > 1
+    return bool(noise > SAME_START * (above[0] - below[-1]))
 
 
 def _starts(idle: Array, moved: Array) -> Ints:

@@ -9,7 +9,7 @@ from calib.closed_form import PoseViews
 from calib.errors import UnsolvableError
 from calib.parameters import Held
 from calib.session import Camera, Joint, Session, View, WorldOrigin
-from calib.sweeps import sweep_labels
+from calib.sweeps import SAME_START, reading_spans, sweep_labels
 
 Mask = NDArray[np.bool_]
 
@@ -22,9 +22,7 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
     """
     if session.complete or not session.joints or not session.views:
         return session, None
-    fit = [index for index, view in enumerate(session.views) if view.use == "fit"]
-    views = PoseViews.of(session, fit, np.zeros((len(fit), 4, 4)))
-    labels = sweep_labels(views.readings, views.exercised, views.cameras, views.links)
+    labels = _labels(session)
     done: Mask = np.asarray((labels >= 0).any(axis=0))
     if done.all():
         return (
@@ -37,15 +35,43 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
             "run the calibration again"
         )
     swept = (labels[:, done] >= 0).any(axis=1)
-    rest = np.median(views.readings[swept][:, ~done], axis=0)
-    readings = session.readings()
-    slack = 0.01 * np.maximum(np.ptp(readings[:, ~done], axis=0), 1e-12)
-    kept: Mask = np.asarray((np.abs(readings[:, ~done] - rest) <= slack).all(axis=1))
+    rest = np.median(session.readings()[swept], axis=0)
     left_out = [joint for joint, finished in zip(session.joints, done, strict=True) if not finished]
     sentence = "the session was cut off: " + " and ".join(
         f"joint '{joint.name}' was not exercised and counts as fixed at {reading:g} {joint.reading_unit}"
-        for joint, reading in zip(left_out, rest, strict=True)
+        for joint, reading in zip(left_out, rest[~done], strict=True)
     )
+    return _where_others_stand(session, done, rest)[0], sentence
+
+
+def part_about(session: Session, readings: Sequence[float]) -> tuple[Session, list[int], list[float]]:
+    """Return what tells of the camera at `readings` (m,): the views in which joints not exercised yet stand there.
+
+    It comes as a session without those joints, with the places of its views in `session` and its own readings. Raises
+    UnsolvableError where no joint has been exercised.
+    """
+    done: Mask = np.asarray((_labels(session) >= 0).any(axis=0))
+    part, kept = _where_others_stand(session, done, np.asarray(readings, dtype=float))
+    if not done.any() or not kept.any():
+        raise UnsolvableError("no joint has been exercised yet from where the others stand")
+    return part, np.flatnonzero(kept).tolist(), np.asarray(readings)[done].tolist()
+
+
+def _labels(session: Session) -> NDArray[np.intp]:
+    """Return which of each joint's sweeps a view belongs to (n, m), -1 for none, as views held out do."""
+    views = PoseViews.of(session, range(len(session.views)), np.zeros((len(session.views), 4, 4)))
+    fit = np.array([view.use == "fit" for view in session.views])
+    exercised = np.where(fit, views.exercised, -1)
+    return sweep_labels(views.readings, exercised, views.cameras, views.links)
+
+
+def _where_others_stand(session: Session, done: Mask, rest: NDArray[np.float64]) -> tuple[Session, Mask]:
+    """Return `session` with the joints `done` (m,) alone, and its views (n,): those with the others at `rest` (m,)."""
+    readings = session.readings()
+    exercised = PoseViews.of(session, range(len(readings)), np.zeros((len(readings), 4, 4))).exercised
+    slack = SAME_START * np.maximum(reading_spans(readings, exercised), 1e-12)
+    kept: Mask = np.asarray((np.abs(readings - rest) <= slack)[:, ~done].all(axis=1))
+    left_out = [joint for joint, finished in zip(session.joints, done, strict=True) if not finished]
     names = [joint.name for joint, finished in zip(session.joints, done, strict=True) if finished]
     reduced = session.model_copy(
         update={
@@ -60,7 +86,7 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
             "origin": session.origin and _reduced_origin(session.origin, done),
         }
     )
-    return reduced.at(session.folder), sentence
+    return reduced.at(session.folder), kept
 
 
 def _with_readings(view: View, done: Mask, names: list[str]) -> View:

@@ -6,6 +6,7 @@ import pytest
 from calib import solve
 from calib.errors import UnsolvableError
 from calib.session import Session
+from calib.sweeps import reading_spans
 from calib.unfinished import finished_part
 from tests.calib.rigs import pose_session, random_rig
 
@@ -71,6 +72,46 @@ def test_steps_of_half_a_turn_are_refused() -> None:
     wide = [("j0", np.array([angle]) / rig.scales) for angle in (0.0, 0.5, 1.0, 5.5)]
     with pytest.raises(UnsolvableError, match="less than half a turn apart, so take views in between"):
         solve(pose_session(rig, wide))
+
+
+@pytest.mark.parametrize("count", [5, 7, 9, 12, 14, 16, 19])
+def test_readings_of_joints_that_stand_still_jitter(count: int) -> None:
+    """Nobody knows how noisy joints are that were not exercised yet: what they differ by is no other start."""
+    rig = random_rig(
+        np.random.default_rng(2), ["revolute", "prismatic", "revolute", "revolute"], ["skew"] * 3
+    )
+    starts = np.array([[0.0, 0.1, 0.2, -0.1], [0.3, 0.0, 0.2, -0.1]])
+    sweeps = [("j0", 0, starts[0]), ("j1", 1, starts[1]), ("j2", 2, starts[1])]
+    noise = np.random.default_rng(5)
+    views = []
+    for name, joint, start in sweeps:
+        for step in np.linspace(-0.3, 0.3, 7):
+            at = start + (np.arange(4) == joint) * step
+            views.append((name, at, at + 1e-5 * noise.integers(-2, 3, 4)))
+    session = pose_session(
+        rig, [(name, read / rig.scales) for name, _, read in views[:count]], complete=False
+    )
+    poses = [rig.pose(at / rig.scales).tolist() for _, at, _ in views]
+    placed = [
+        view.model_copy(update={"world_from_camera": pose})
+        for view, pose in zip(session.views, poses, strict=False)
+    ]
+    part, sentence = finished_part(session.with_views(placed))
+    begun = 1 + (count - 2) // 7
+    assert [joint.name for joint in part.joints] == ["j0", "j1", "j2"][:begun]
+    assert sentence is not None
+    calibration = solve(session.with_views(placed))
+    moved = {0: slice(0, 7), 1: slice(7, 14), 2: slice(14, 21)}[begun - 1]
+    kept = [at for _, at, _ in views[moved]][: count - 7 * (begun - 1)]
+    found = calibration.world_from_camera([(at / rig.scales)[:begun] for at in kept])
+    assert np.allclose(found, [rig.pose(at / rig.scales) for at in kept], atol=3e-4)
+
+
+def test_two_values_are_two_starts_unless_they_alternate() -> None:
+    exercised = np.zeros(6, dtype=int)
+    moved = np.arange(6.0)
+    for idle, span in (([0, 0, 0, 5, 5, 5], 5.0), ([0, 5, 0, 0, 5, 0], np.inf), ([5] * 6, 0.0)):
+        assert reading_spans(np.column_stack([moved, idle]), exercised).tolist() == [5.0, span]
 
 
 def test_a_joint_that_did_not_turn_is_refused() -> None:
