@@ -40,17 +40,23 @@ def pose_from_view(world: ArrayLike, pixels: ArrayLike, lens: Intrinsics) -> Arr
 def _guesses(world: Array, flat: Array) -> list[tuple[Array, Array]]:
     # A plate that bulges has the two poses of a plane, from which each is refined with the bulge.
     nearly_flat = np.abs(world[:, 2]).max() <= NEARLY_FLAT * np.ptp(world[:, :2])
-    method = cv2.SOLVEPNP_IPPE if nearly_flat else cv2.SOLVEPNP_SQPNP
-    points = world * [1, 1, 0] if nearly_flat else world
-    count, rotations, translations, _ = cv2.solvePnPGeneric(points, flat, np.eye(3), None, flags=method)
-    if count == 0:
+    guesses = _posed(world * [1, 1, 0], flat, cv2.SOLVEPNP_IPPE) if nearly_flat else []
+    # OpenCV has no number for a plane whose middle is seen right ahead.
+    guesses = guesses or _posed(world, flat, cv2.SOLVEPNP_SQPNP)
+    if not guesses:
         raise UnsolvableError(
             "no camera pose explains where the target's points are seen: are their ids right?"
         )
-    return [
+    return guesses
+
+
+def _posed(world: Array, flat: Array, method: int) -> list[tuple[Array, Array]]:
+    _, rotations, translations, _ = cv2.solvePnPGeneric(world, flat, np.eye(3), None, flags=method)
+    poses = [
         (np.asarray(r, dtype=float), np.asarray(t, dtype=float))
         for r, t in zip(rotations, translations, strict=True)
     ]
+    return [(r, t) for r, t in poses if np.isfinite(r).all() and np.isfinite(t).all()]
 
 
 def _refined(world: Array, flat: Array, guess: tuple[Array, Array]) -> Array:
