@@ -1,6 +1,6 @@
 """The closed form of a whole session: lenses, poses, the way round of a symmetric target, and the chain."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,11 +14,12 @@ from calib.lens import project_points
 from calib.lens_calibration import calibrate_camera
 from calib.lens_prior import lens_prior
 from calib.observations import Observation
-from calib.orientation import agreed, carried_on
+from calib.orientation import Solved, oriented
 from calib.session import Camera, Intrinsics, Session, WorldOrigin
 from calib.solution import Solution
 from calib.targets import TargetSymmetry, disk_diameter, target_points, target_symmetries
 from calib.transforms import inverse
+from calib.units import nominal_scale
 
 Array = NDArray[np.float64]
 
@@ -70,6 +71,20 @@ def _picture_size(camera: Camera) -> tuple[int, int]:
     return camera.width, camera.height
 
 
+@dataclass(frozen=True, eq=False)
+class ReadOneWay:
+    """Views that have a symmetric target the same way round, and the chain and mounts solved from them.
+
+    `origin` says which way that is, None where the target is not symmetric; `undecided` are the views, by place in the
+    session, that may have it another way round.
+    """
+
+    views: PoseViews
+    solved: Solved
+    origin: WorldOrigin | None
+    undecided: Sequence[int]
+
+
 def first_solution(session: Session, observations: Sequence[Observation], seen: CameraViews) -> Solution:
     """Solve the chain in closed form, with a symmetric target taken the same way round in all views.
 
@@ -77,25 +92,37 @@ def first_solution(session: Session, observations: Sequence[Observation], seen: 
     """
     if not session.joints:
         return Solution(Chain.of([], [], [], []), None, seen.lenses)
+    read = read_one_way(session, observations, seen, partial(solve_chain, session))
+    return Solution(*read.solved, seen.lenses, read.origin, read.undecided)
+
+
+def read_one_way(
+    session: Session,
+    observations: Sequence[Observation],
+    seen: CameraViews,
+    solve: Callable[[PoseViews], Solved],
+) -> ReadOneWay:
+    """Return all views with a symmetric target the way round that the session's origin says, or its first view.
+
+    Raises what `solve` raises.
+    """
     views = PoseViews.of(session, [observation.view for observation in observations], seen.poses)
     symmetries = target_symmetries(session.target)
-
-    def solved(poses: Array) -> tuple[Chain, Array]:
-        return solve_chain(session, replace(views, poses=poses))
-
     if not symmetries:
-        return Solution(*solved(seen.poses), seen.lenses)
+        return ReadOneWay(views, solve(views), session.origin, ())
     turnable = np.array([observation.pose is None for observation in observations])
-    views = replace(views, poses=carried_on(views, symmetries, turnable))
-    poses, (chain, mounts) = agreed(views, symmetries, turnable, solved)
-    solution = Solution(chain, mounts, seen.lenses, session.origin)
+    units = [nominal_scale(joint.kind, joint.reading_unit) for joint in session.joints]
+    found = oriented(views, symmetries, turnable, solve, units)
+    views, undecided = replace(views, poses=found.poses), [observations[i].view for i in found.undecided]
+    solution = Solution(*found.solved, seen.lenses)
     if session.origin is None:
-        return replace(solution, origin=_first_origin(session, solution, observations[0].view))
+        origin = _first_origin(session, solution, observations[0].view)
+        return ReadOneWay(views, found.solved, origin, undecided)
     turn = _turn_to_origin(session, session.origin, solution, symmetries)
     if turn is None:
-        return solution
-    chain, mounts = solved(turn.turned_from_world @ poses)
-    return replace(solution, chain=chain, mounts=mounts)
+        return ReadOneWay(views, found.solved, session.origin, undecided)
+    views = replace(views, poses=turn.turned_from_world @ views.poses)
+    return ReadOneWay(views, solve(views), session.origin, undecided)
 
 
 def _first_origin(session: Session, solution: Solution, view: int) -> WorldOrigin | None:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from calib.chain import Chain
 from calib.closed_form import PoseViews, mean_mount
 from calib.errors import UnsolvableError
-from calib.first_solution import CameraViews
+from calib.first_solution import CameraViews, read_one_way
 from calib.held_chain import held_chain
 from calib.likelihood.state import joint_basis
 from calib.observations import Observation
+from calib.orientation import Solved
 from calib.session import DhRow, Nominal, Session
 from calib.solution import Solution
 from calib.transforms import any_normal, inverse, nearest_rotation, rotation_log, transform
@@ -47,14 +48,24 @@ def nominal_solution(
     The first camera places it; others are put where their own views have them. Raises UnsolvableError.
     """
     kinds = [joint.kind for joint in session.joints]
-    views = PoseViews.of(session, [observation.view for observation in observations], seen.poses)
-    own = (views.cameras == 0) & (views.links[0] == len(kinds))
-    found = placed(nominal, kinds, views.poses[own], views.readings[own])
-    mounts = np.array([found.mount, *[mean_mount(found.chain, views, c) for c in range(1, len(views.links))]])
+
+    def place(views: PoseViews) -> Placed:
+        own = (views.cameras == 0) & (views.links[0] == len(kinds))
+        return placed(nominal, kinds, views.poses[own], views.readings[own])
+
+    def solve(views: PoseViews) -> Solved:
+        found = place(views)
+        others = [mean_mount(found.chain, views, camera) for camera in range(1, len(views.links))]
+        return found.chain, np.array([found.mount, *others])
+
+    read = read_one_way(session, observations, seen, solve)
+    found = place(read.views)
     return Solution(
         held_chain(session, found.chain),
-        mounts,
+        read.solved[1],
         seen.lenses,
+        origin=read.origin,
+        undecided=read.undecided,
         prior=prior_information(nominal, kinds, found),
         world_from_base=found.world_from_base,
     )

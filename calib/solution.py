@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 class Solution:
     """The chain, each camera's pose at all readings 0 `mounts` (c, 4, 4), and its lens; None where there is none.
 
-    `origin` says which way round a symmetric target is taken, `covariance` the names of the document's numbers and
-    their covariance (d, d), `left_out` (views by place, and points as (view, id)) what did not belong, `refined` the
+    `origin` says which way round a symmetric target is taken, `undecided` are the views, by place, that may have seen
+    it another way round, `covariance` the names of the document's numbers and their covariance (d, d), `left_out`
+    (views by place, and points as (view, id)) what did not belong, `refined` the
     fit that it is from, if any, `weaknesses` what the views leave in the dark, `noise_px` how much single points
     scatter. `prior` (k, k) is what a nominal model knows of the chain, and `world_from_base`
     (4, 4) its base. `corrections` are what imperfect joints add to their readings, `warp` the height (m) of each
@@ -33,6 +34,7 @@ class Solution:
     mounts: Array | None
     lenses: list[Intrinsics | None]
     origin: WorldOrigin | None = None
+    undecided: Sequence[int] = ()
     covariance: tuple[list[str], Array] | None = None
     left_out: tuple[Sequence[int], Sequence[tuple[int, int]]] = ((), ())
     refined: Refined | None = None

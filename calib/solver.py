@@ -12,6 +12,7 @@ from calib.lens_calibration import lens_in_words
 from calib.most_likely import left_out_in_words, most_likely
 from calib.nominal import nominal_solution
 from calib.observations import Observation, Progress, observe
+from calib.orientation import undecided_in_words
 from calib.parameters import Held
 from calib.quality import judged
 from calib.session import Session
@@ -53,6 +54,7 @@ def solve(
     if fitted:
         solution = most_likely(session, fit, solution, target_warp)
     warnings = [] if cut_off is None else [cut_off]
+    warnings += undecided_in_words(solution.undecided, session.target.kind)
     units = {joint.name: joint.reading_unit for joint in session.joints}
     warnings += [weakness_in_words(weakness, units) for weakness in solution.weaknesses]
     for camera, std in zip(session.cameras, seen.focal_std, strict=True):
