@@ -4,9 +4,9 @@ A driver is a class with the attributes below, registered by name (see `drivers.
 are the keys of its table in the profile beside `driver`, checked strictly before anything is made.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 from pydantic import BaseModel, ConfigDict
 
@@ -65,4 +65,14 @@ class CameraDriver(Protocol):
     @classmethod
     def create(cls, spec: CameraSpec, options: Any, context: DriverContext) -> CameraSource:
         """Make a camera that is not open yet. Raises OptionsError where the options do not fit."""
+        ...
+
+
+@runtime_checkable
+class Cautious(Protocol):
+    """A controller or camera that has something to say of the device it found. Others need not be one."""
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """Sentences on what is not as the profile asks or as a calibration needs it, since `open`."""
         ...

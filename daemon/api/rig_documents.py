@@ -57,6 +57,10 @@ class DeviceDocument(BaseModel):
     connected: bool
     lost: str | None
     reconnects: int
+    warnings: list[str] = Field(
+        description="What is not as the profile asks, or as a calibration needs it.",
+        examples=[["camera 'main' gives 15 frames a second and was asked for 30"]],
+    )
 
     @classmethod
     def of(cls, device: DeviceSnapshot) -> Self:
@@ -67,6 +71,7 @@ class DeviceDocument(BaseModel):
             connected=device.lost is None,
             lost=device.lost,
             reconnects=device.reconnects,
+            warnings=list(device.warnings),
         )
 
 

@@ -42,6 +42,9 @@ class Survey:
         """
         joints = list(dict.fromkeys(sweep.joint for sweep in self._procedure.sweeps))
         self._log.add(Planned(views=self._positions, joints=joints))
+        for device in self._rig.snapshot.devices:
+            for warning in device.warnings:
+                self._log.add(Warned(message=warning))
         await self._home()
         for sweep in self._procedure.sweeps:
             await self._sweep(sweep)

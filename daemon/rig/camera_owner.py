@@ -15,7 +15,7 @@ class CameraOwner(DeviceOwner):
         self, name: str, camera: CameraSource, frame_timeout: float, publish: Callable[[], None]
     ) -> None:
         """`frame_timeout` (s of life): how long a frame may take to come."""
-        super().__init__(name, "camera", publish)
+        super().__init__(name, "camera", camera, publish)
         self._camera = camera
         self._frame_timeout = frame_timeout
         self._gone: asyncio.Future[None] | None = None

@@ -43,7 +43,7 @@ class ControllerOwner(DeviceOwner):
         latch: StopLatch,
         publish: Callable[[], None],
     ) -> None:
-        super().__init__(name, "controller", publish)
+        super().__init__(name, "controller", controller, publish)
         self._controller = controller
         self._latch = latch
         self._axes = {axis: _AxisRecord(spec) for axis, spec in specs.items()}

@@ -8,6 +8,7 @@ from typing import Final, Literal
 
 from daemon.rig.snapshot import DeviceSnapshot
 from drivers.cancellation import finish
+from drivers.driver import Cautious
 from drivers.errors import DriverError
 
 logger = logging.getLogger(__name__)
@@ -20,19 +21,24 @@ LONGEST_DELAY: Final = 5.0
 class DeviceOwner(ABC):
     """One device, from `run` until its cancellation. A subclass says how it is opened, served and closed."""
 
-    def __init__(self, name: str, kind: Literal["controller", "camera"], publish: Callable[[], None]) -> None:
+    def __init__(
+        self, name: str, kind: Literal["controller", "camera"], hardware: object, publish: Callable[[], None]
+    ) -> None:
         self.name = name
         self.kind: Literal["controller", "camera"] = kind
+        self.warnings: tuple[str, ...] = ()
+        """What the driver had to say of the device when it was opened."""
         self.lost: str | None = f"{kind} '{name}' is not connected yet"
         self.reconnects = 0
         self.attempted = asyncio.Event()
         """Set once the first attempt to connect has ended, one way or the other."""
+        self._hardware = hardware
         self._publish = publish
 
     @property
     def device(self) -> DeviceSnapshot:
         """What there is to say of the device as a whole."""
-        return DeviceSnapshot(self.name, self.kind, self.lost, self.reconnects)
+        return DeviceSnapshot(self.name, self.kind, self.lost, self.reconnects, self.warnings)
 
     async def run(self) -> None:
         """Keep the device connected until cancelled; then close it, which stops what moves."""
@@ -45,6 +51,7 @@ class DeviceOwner(ABC):
                 self.reconnects += connected_before
                 connected_before, delay = True, FIRST_DELAY
                 logger.info("%s '%s' is connected", self.kind, self.name)
+                self._note_warnings()
                 self.attempted.set()
                 await self._serve()
             except Exception as error:  # whatever a driver raises, its owner must go on
@@ -54,6 +61,13 @@ class DeviceOwner(ABC):
                 await finish(self._close_quietly())
             await asyncio.sleep(delay)
             delay = min(2 * delay, LONGEST_DELAY)
+
+    def _note_warnings(self) -> None:
+        warnings = tuple(self._hardware.warnings) if isinstance(self._hardware, Cautious) else ()
+        for sentence in warnings:
+            if sentence not in self.warnings:
+                logger.warning(sentence)
+        self.warnings = warnings
 
     def _lose(self, error: Exception) -> None:
         expected = isinstance(error, DriverError | OSError)

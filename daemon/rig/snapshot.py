@@ -41,6 +41,8 @@ class DeviceSnapshot:
     """The driver's sentence while it is lost, None while it is connected."""
     reconnects: int
     """How many times it has been found again."""
+    warnings: tuple[str, ...] = ()
+    """The driver's sentences on what is not as the profile asks or a calibration needs it."""
 
 
 @dataclass(frozen=True, slots=True)
