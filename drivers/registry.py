@@ -24,7 +24,12 @@ DriverKind = Literal["controllers", "cameras"]
 BUILT_IN: Final[Mapping[DriverKind, Mapping[str, str]]] = MappingProxyType(
     {
         "controllers": {"simulated": "drivers.simulated:SimulatedController"},
-        "cameras": {"simulated": "drivers.simulated:SimulatedCamera"},
+        "cameras": {
+            "replay": "drivers.video:ReplayCamera",
+            "simulated": "drivers.simulated:SimulatedCamera",
+            "stream": "drivers.video:StreamCamera",
+            "v4l2": "drivers.video:V4l2Camera",
+        },
     }
 )
 _REQUIRED: Final[Mapping[DriverKind, tuple[str, ...]]] = MappingProxyType(

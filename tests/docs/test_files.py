@@ -17,6 +17,7 @@ from drivers.quantities import QuantityType, parse_quantity
 from drivers.simulated import options
 from drivers.simulated.camera import SimulatedCameraOptions
 from drivers.simulated.controller import SimulatedAxisOptions, SimulatedControllerOptions
+from drivers.video.options import ReplayOptions, StreamOptions, V4l2Options
 from tests.docs.pages import Block, blocks, page, pages, table_below, unquoted
 
 PAGE = "reference/files.md"
@@ -40,6 +41,9 @@ MODELS: dict[str, type[BaseModel]] = {
     "In `[controllers.NAME]`:": SimulatedControllerOptions,
     "In an axis's `options`:": SimulatedAxisOptions,
     "In the camera's `options`:": SimulatedCameraOptions,
+    "### The keys of a V4L2 camera": V4l2Options,
+    "### The keys of a stream": StreamOptions,
+    "### The keys of a replay": ReplayOptions,
     "### The session": calib_session.Session,
     "### A joint": calib_session.Joint,
     "### A camera": calib_session.Camera,
