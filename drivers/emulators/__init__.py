@@ -3,4 +3,5 @@
 emulator    what an emulator is, and the faults that it has on request
 registry    which driver's device has one
 control     faults by lines of text
+camera      a network camera, MJPEG over HTTP
 """

@@ -12,7 +12,10 @@ from drivers.registry import DriverKind
 EMULATORS: Final[Mapping[DriverKind, Mapping[str, str]]] = MappingProxyType(
     {
         "controllers": {},
-        "cameras": {},
+        "cameras": {
+            "stream": "drivers.emulators.camera:StreamEmulator",
+            "v4l2": "drivers.emulators.camera:StreamEmulator",
+        },
     }
 )
 """By the driver's name, `module:Class`."""
