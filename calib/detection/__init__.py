@@ -5,7 +5,8 @@ circle_grid  symmetric and asymmetric grids of disks;  disks: their centroids on
 chessboard   its inner corners
 charuco      chessboard corners, numbered by markers;  corners: both kinds' corners on the grey values
 aprilgrid    corners of tags;  tag_edges: the lines that cross in them
-plane        how a flat target lies in the picture
+grey_fit     drawings fitted to grey values;  strips: the pixels along edges;  edge_profile: what blur makes of edges
+plane        how a flat target lies in the picture, and how a lens bends it;  smooth: what changes smoothly over it
 labelling    which of a grid's readings is the target's
 detector     one call for all kinds;  averaging  over several frames of one view
 tracking     measuring where the target is expected;  marks, lattice: what is to be seen there, and beyond

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 import cv2
 import numpy as np
 
-from calib.detection.corners import corner_covariances, refine_corners
+from calib.detection.corners import measure_corners
 from calib.detection.detection import Detection
 from calib.detection.picture import Picture
 from calib.detection.plane import view_of_plane
@@ -32,11 +30,8 @@ def detect_charuco(picture: Picture, target: Charuco) -> Detection:
             f"corners and {seen} markers of {target.dictionary} were seen in the picture of "
             f"{picture.size}, and 4 corners not on one line are needed; is it in view and sharp?"
         )
-    # A marker's own corner is the nearest thing to a corner of the board, across a white square's diagonal.
-    clear = (target.pitch - target.marker) / 2 * sqrt(2)
-    reaches = clear * view.scales(plane)
+    clear = (target.pitch - target.marker) / 2
     # OpenCV 4's corners are half a pixel off, which measuring them anew mends.
-    pixels = refine_corners(picture, rough, reaches)
+    pixels, covariances = measure_corners(picture, view, plane, rough, target.pitch, clear)
     order = np.argsort(ids)
-    covariances = corner_covariances(picture, pixels, reaches)
     return Detection(ids[order], pixels[order], covariances[order], disk=None)

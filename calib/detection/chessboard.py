@@ -8,18 +8,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.corners import corner_covariances, refine_corners
+from calib.detection.corners import measure_corners
 from calib.detection.detection import Detection
 from calib.detection.labelling import is_mirrored, upright
 from calib.detection.picture import Picture, copies, in_original
+from calib.detection.plane import view_of_plane
 from calib.errors import DetectionError
-from calib.targets import Chessboard
+from calib.targets import Chessboard, target_points
 
 SEARCHED_SIDE = 800
 MIDDLE, BESIDE_CORNER = 0.5, 0.15  # places in a square, in steps from corner to corner along both sides
 LEAST_CONTRAST = 0.15  # beside a corner, of that in the middle; disks have it in the middle alone
 LEAST_CHEQUERED = 0.9  # of the corners
-CLEAR_OF_NEIGHBOURS = 0.45  # of the distance to the next corners; beyond half of it, theirs are seen too
+COPYS_ERROR = 1.5  # px of the copy
+STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.1)
 
 
 def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
@@ -27,37 +29,44 @@ def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
     candidates = (grid[:, ::-1] if is_mirrored(grid) else grid for grid in _found(picture.grey, target))
     boards = (_with_colours_in_place(picture.grey, grid) for grid in candidates)
     grid = next((board for board in boards if board is not None), None)
+    not_found = DetectionError(
+        f"the chessboard of {target.rows} x {target.columns} inner corners was not found in the picture "
+        f"of {picture.size}: is the whole board in it, with a white rim, sharp and evenly lit?"
+    )
     if grid is None:
-        raise DetectionError(
-            f"the chessboard of {target.rows} x {target.columns} inner corners was not found in the picture "
-            f"of {picture.size}: is the whole board in it, with a white rim, sharp and evenly lit?"
-        )
-    reaches = CLEAR_OF_NEIGHBOURS * _line_spacings(grid)
-    pixels = refine_corners(picture, grid.reshape(-1, 2), reaches)
+        raise not_found
+    points = target_points(target)[:, :2]
+    rough = grid.reshape(-1, 2)
+    view = view_of_plane(points, rough)
+    if view is None:
+        raise not_found
+    pixels, covariances = measure_corners(picture, view, points, rough, target.pitch, target.pitch / 2)
     reading = upright(target, pixels)
-    covariances = corner_covariances(picture, pixels, reaches)
     return Detection(np.arange(len(pixels)), pixels[reading], covariances[reading], disk=None)
 
 
 def _found(grey: NDArray[np.uint8], target: Chessboard) -> Iterator[NDArray[np.float64]]:
     """Search ever harder for corners (rows, columns, 2), in any of the orders that OpenCV may choose.
 
-    A board that fills enough of the picture is found in a smaller copy, in a tenth of the time.
+    A board that fills enough of the picture is found in a smaller copy, in a tenth of the time. The whole of a larger
+    picture is searched in the one way that does not take ever longer the more there is to be seen in it.
     """
     pattern = (target.columns, target.rows)
     for searched, scale in copies(grey, SEARCHED_SIDE):
-        for search in SEARCHES:
+        searches = SEARCHES if max(searched.shape) <= SEARCHED_SIDE else (_by_sectors,)
+        for search in searches:
             found, corners = search(searched, pattern)
             if found:
-                yield in_original(np.asarray(corners, dtype=np.float64), scale).reshape(*pattern[::-1], 2)
-
-
-def _quickly(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
-    return cv2.findChessboardCornersSB(grey, pattern)
+                near = in_original(np.asarray(corners, dtype=np.float64), scale)
+                yield _brought_near(grey, near, scale).reshape(*pattern[::-1], 2)
 
 
 def _by_quadrangles(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
     return cv2.findChessboardCorners(grey, pattern)
+
+
+def _by_sectors(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
+    return cv2.findChessboardCornersSB(grey, pattern)
 
 
 def _thoroughly(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
@@ -65,7 +74,16 @@ def _thoroughly(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool
     return cv2.findChessboardCornersSB(grey, pattern, flags=flags)
 
 
-SEARCHES = (_quickly, _by_quadrangles, _thoroughly)
+SEARCHES = (_by_quadrangles, _by_sectors, _thoroughly)
+
+
+def _brought_near(grey: NDArray[np.uint8], pixels: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+    """Move corners found in a smaller copy by up to some of its pixels, of which a square has several."""
+    if scale == 1:
+        return pixels
+    half = max(round(COPYS_ERROR / scale), 2)
+    corners = np.ascontiguousarray(pixels, dtype=np.float32)
+    return np.asarray(cv2.cornerSubPix(grey, corners, (half, half), (-1, -1), STOP), dtype=np.float64)
 
 
 def _with_colours_in_place(grey: NDArray[np.uint8], grid: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -113,12 +131,3 @@ def _values(grey: NDArray[np.uint8], pixels: NDArray[np.float64]) -> NDArray[np.
     last = np.array(grey.shape[::-1]) - 1
     nearest = np.clip(np.rint(pixels), 0, last).astype(int)
     return np.asarray(grey[nearest[..., 1], nearest[..., 0]], dtype=np.float64)
-
-
-def _line_spacings(grid: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance (rows * columns,) in px from each corner to the nearer of the next lines through corners."""
-    along_columns: NDArray[np.float64] = np.gradient(grid, axis=0)
-    along_rows: NDArray[np.float64] = np.gradient(grid, axis=1)
-    area = along_rows[..., 0] * along_columns[..., 1] - along_rows[..., 1] * along_columns[..., 0]
-    longer = np.maximum(np.linalg.norm(along_rows, axis=-1), np.linalg.norm(along_columns, axis=-1))
-    return np.asarray((np.abs(area) / longer).ravel())

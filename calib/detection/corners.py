@@ -1,62 +1,165 @@
-"""Corners measured on the grey values."""
+"""Corners where four squares meet, measured on the grey values along the edges that cross in them."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from math import pi
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.detection.edge_profile import FIRST_BLUR, LEAST_BLUR, profile
+from calib.detection.grey_fit import GreyFit, Light, fit_grey_values
 from calib.detection.picture import Picture
+from calib.detection.plane import BentView, PlaneView, bent_view
+from calib.detection.smooth import smooth
+from calib.detection.strips import Floats, Patches, Singles, strips
 
-SMALLEST_WINDOW, LARGEST_WINDOW = 2, 15
-SMOOTHING = (
-    1.0  # px; differences between neighbouring pixels magnify noise and depend on where the pixels lie
+REACHED = 0.5  # of the way to the next corner, so that no pixel tells of two
+FIRST_LENGTH, FIRST_WIDTH = 8.0, 4.0  # px; of the edges and to both sides, while corners are known roughly
+SHOWN = (
+    3.0  # standard deviations of the blur to both sides of an edge: what tells where it is, and its levels
 )
-SCATTER_OVER_BOUND = 1.6  # seen on drawn corners
-UNMODELLED_VARIANCE = 0.025**2  # px²; shading, and where the pixels lie
-STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-3)
+NARROWEST = 1.5  # px; of what is taken to each side
+NEIGHBOURS_REACH = 2.0
+"""In standard deviations of the blur: neighbours look the same turned half way, and pull to neither side."""
+SHARPEST = 0.45  # px; in sharper pictures places depend on where the pixels lie
+SOFTENING = 1.0  # px, standard deviation
+SHARED_NOISE = 4 * pi * SOFTENING**2  # pixels of a softened picture that have one noise
+BENDS_DEGREE, LIGHTS_DEGREE = 5, 2
+LEAST_SLOPE = 1e-6  # of the light a px
+UNMODELLED_VARIANCE = 0.001**2  # px²; the shape of the pixels and of the lens' blur
+UNMEASURED_VARIANCE = 0.5**2  # px²; where the drawing does not fit
 
 
-def refine_corners(
-    picture: Picture, pixels: NDArray[np.float64], reaches: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Move corners (n, 2) to where the grey values' gradients point past them (Förstner's operator).
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Roughly what n corners look like: two edges cross at each of the `pixels` (n, 2).
 
-    `reaches` (n,) is how far (px) round each corner nothing but its own edges is to be seen.
+    `directions` (n, 2, 2) are the unit vectors along the one and the other; `bends` (n, 2) their curvatures in
+    1/px, positive where they curve to the right of them (in a picture whose y points down).
+    Nothing but the two edges is to be seen up to `lengths` (n, 2) px along each, in a strip of `clear` (n,) px to
+    both sides of each.
     """
-    smooth = cv2.GaussianBlur(picture.values, (0, 0), SMOOTHING)
-    refined = pixels.astype(np.float32).reshape(-1, 1, 1, 2)
-    for corner, half in zip(refined, _half_windows(reaches), strict=True):
-        cv2.cornerSubPix(smooth, corner, (int(half), int(half)), (-1, -1), STOP)
-    return refined.reshape(-1, 2).astype(np.float64)
+
+    pixels: Floats
+    directions: Floats
+    bends: Floats
+    lengths: Floats
+    clear: Floats
 
 
-def corner_covariances(
-    picture: Picture, pixels: NDArray[np.float64], reaches: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Estimate the covariances (n, 2, 2) in px² of measured corners.
+def measure_corners(
+    picture: Picture, view: PlaneView, points: Floats, pixels: Floats, pitch: float, clear: float
+) -> tuple[Floats, Floats]:
+    """Measure the corners at points (n, 2) of a print, in m, which are within 2 px or so of pixels (n, 2).
 
-    The picture's noise sets a bound, noise² (sum of g gᵀ)⁻¹ over the gradients g of the patch, from which the
-    measurement keeps some distance.
+    Edges run through them along x and y, with the next ones `pitch` (m) away and nothing else `clear` (m) to both
+    sides. Gives the pixels (n, 2), and their covariances (n, 2, 2) in px².
     """
-    halves = _half_windows(reaches)
-    information = np.empty((len(pixels), 2, 2))
-    for tensor, centre, half in zip(information, pixels, halves, strict=True):
-        patch = cv2.getRectSubPix(
-            picture.values, (int(2 * half + 3),) * 2, (float(centre[0]), float(centre[1]))
-        )
-        along_x = (patch[1:-1, 2:] - patch[1:-1, :-2]) / 2
-        along_y = (patch[2:, 1:-1] - patch[:-2, 1:-1]) / 2
-        gradients = np.stack([along_x.ravel(), along_y.ravel()]).astype(np.float64)
-        tensor[:] = gradients @ gradients.T
-    # A patch without any structure knows its place to within the window only.
-    information += (picture.noise / halves)[:, None, None] ** 2 * np.eye(2)
-    return (SCATTER_OVER_BOUND * picture.noise) ** 2 * np.linalg.inv(
-        information
-    ) + UNMODELLED_VARIANCE * np.eye(2)
+    n = len(pixels)
+    crossings = _crossings(bent_view(view, points, pixels, BENDS_DEGREE), points, pixels, pitch, clear)
+    near = replace(crossings, lengths=np.minimum(crossings.lengths, FIRST_LENGTH))
+    rough = _fit(picture, near, FIRST_WIDTH, np.full(n, FIRST_BLUR), Light.unknown(n))
+    good = rough.converged
+    if not good.any():
+        return pixels, np.tile(UNMEASURED_VARIANCE * np.eye(2), (n, 1, 1))
+    pixels = np.where(good[:, None], pixels + rough.parameters[:, :2], pixels)
+    blurs = np.exp(np.where(good, rough.parameters[:, 2], np.median(rough.parameters[good, 2])))
+    sharp = bool(np.median(blurs) < SHARPEST)
+    if sharp:
+        softened = cv2.GaussianBlur(picture.values, (0, 0), SOFTENING)
+        picture = replace(picture, values=np.asarray(softened, dtype=np.float32))
+        blurs = np.hypot(blurs, SOFTENING)
+
+    crossings = _crossings(bent_view(view, points[good], pixels[good], BENDS_DEGREE), points, pixels, pitch, clear)
+    levels = np.log(np.maximum(rough.means + np.abs(rough.steps), 1))
+    light = _light(pixels, levels, good, float(np.median(crossings.lengths)))
+    blur = float(np.median(blurs))
+    width = max(min(SHOWN * blur, float(np.median(crossings.clear)) - NEIGHBOURS_REACH * blur), NARROWEST)
+    fit = _fit(picture, crossings, width, blurs, light)
+    good &= fit.converged
+    pixels = np.where(good[:, None], pixels + fit.parameters[:, :2], pixels)
+    scatter = fit.covariances[:, :2, :2] * (SHARED_NOISE if sharp else 1)
+    measured = scatter + UNMODELLED_VARIANCE * np.eye(2)
+    return pixels, np.where(good[:, None, None], measured, UNMEASURED_VARIANCE * np.eye(2))
 
 
-def _half_windows(reaches: NDArray[np.float64]) -> NDArray[np.int64]:
-    # The window is a square, and its own corners reach sqrt(2) times as far.
-    halves = np.clip(np.floor(reaches / np.sqrt(2)), SMALLEST_WINDOW, LARGEST_WINDOW)
-    return np.asarray(halves, dtype=np.int64)
+def _crossings(view: BentView, points: Floats, pixels: Floats, pitch: float, clear: float) -> _Crossings:
+    steps = pitch / 2 * np.eye(2)
+    middle = view.project(points)[:, None]
+    ahead, behind = (view.project(points[:, None] + sign * steps) for sign in (1, -1))
+    chords = ahead - behind
+    spacings = np.linalg.norm(chords, axis=-1)
+    directions = chords / spacings[..., None]
+    bends = _cross(directions, ahead + behind - 2 * middle) / (spacings / 2) ** 2
+    # Edges that are not at right angles are nearer to the next ones than the spacing says.
+    apart = spacings.min(axis=1) * np.abs(_cross(directions[:, 0], directions[:, 1]))
+    return _Crossings(pixels, directions, bends, REACHED * spacings, apart * clear / pitch)
+
+
+def _light(pixels: Floats, levels: Floats, good: NDArray[np.bool_], apart: float) -> Light:
+    """Follow the light's logarithms (n,) from good corner to good corner, which are so far `apart` (px)."""
+    light = smooth(pixels[good], levels[good, None], LIGHTS_DEGREE)
+    slopes = [(light.at(pixels + step) - light.at(pixels - step)) / 2 for step in np.eye(2)]
+    off = float(np.sqrt(np.square(levels[good, None] - light.at(pixels[good])).mean()))
+    return Light(np.concatenate(slopes, axis=1), max(off / apart, LEAST_SLOPE))
+
+
+def _fit(picture: Picture, crossings: _Crossings, width: float, blurs: Floats, light: Light) -> GreyFit:
+    start = np.column_stack([np.zeros((len(blurs), 2)), np.log(blurs)])
+    least = np.array([-np.inf, -np.inf, np.log(LEAST_BLUR)])
+    patches, heights = _patches(picture, crossings, width)
+    shape = partial(_saddle, crossings.directions.astype(np.float32), heights)
+    return fit_grey_values(picture, patches, shape, start, least, light)
+
+
+def _patches(
+    picture: Picture, crossings: _Crossings, width: float
+) -> tuple[Patches, tuple[Singles, Singles]]:
+    """Take the pixels along both edges of each crossing; and how far (n, m) they are to the right of either."""
+    reach = crossings.lengths[..., None] * crossings.directions
+    along = [strips(picture, crossings.pixels, -reach[:, edge], reach[:, edge], width) for edge in range(2)]
+    x, y, values, used = (
+        np.concatenate([getattr(each, field.name) for each in along], axis=1) for field in fields(Patches)
+    )
+    directions, bends = (
+        each.astype(np.float32)[..., None] for each in (crossings.directions, crossings.bends)
+    )
+    heights = []
+    for edge in range(2):
+        unit_x, unit_y = directions[:, edge, 0], directions[:, edge, 1]
+        along_it = unit_x * x + unit_y * y
+        heights.append(unit_x * y - unit_y * x - bends[:, edge] / 2 * along_it * along_it)
+    one, other = heights
+    # Where the strips overlap, a pixel belongs to the edge that it is nearer to.
+    nearer = np.abs(one) <= np.abs(other)
+    m = along[0].x.shape[1]
+    used[:, :m] *= nearer[:, :m]
+    used[:, m:] *= ~nearer[:, m:]
+    return Patches(x, y, values, used), (one, other)
+
+
+def _saddle(
+    directions: Singles, heights: tuple[Singles, Singles], parameters: Floats
+) -> tuple[Singles, Singles]:
+    """Draw corners of parameters (n, 3): how far off in x and y, and the blur's logarithm."""
+    off_x, off_y, blur = parameters.astype(np.float32).T[..., None]
+    scale: Singles = np.exp(-blur)
+    (one_x, one_y), (other_x, other_y) = np.moveaxis(directions, 0, -1)[..., None]
+    one_height: Singles = scale * (heights[0] - one_x * off_y + one_y * off_x)
+    other_height: Singles = scale * (heights[1] - other_x * off_y + other_y * off_x)
+    (one, one_slope), (other, other_slope) = profile(one_height), profile(other_height)
+    by_one = 2 * scale * one_slope * other
+    by_other = 2 * scale * other_slope * one
+    derivatives = np.empty((len(parameters), 3, one.shape[1]), dtype=np.float32)
+    derivatives[:, 0] = one_y * by_one + other_y * by_other
+    derivatives[:, 1] = -one_x * by_one - other_x * by_other
+    derivatives[:, 2] = -(one_height * by_one + other_height * by_other) / scale
+    return one * other, derivatives
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

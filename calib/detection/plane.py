@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-POINTS_A_TERM = 2  # of the lens' bend; fewer would be bent to their own errors
+from calib.detection.smooth import Smooth, smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,39 +36,23 @@ class PlaneView:
 
 @dataclass(frozen=True, eq=False)
 class BentView:
-    """A view through a lens that bends lines: `view`, and the cubic by which the points seen are off it.
-
-    The cubic is one in the pixels of the view, less `middle` (2,) and divided by `span`; its `bend` (k, 2) are the
-    coefficients, px, of as many terms as the points allowed.
-    """
+    """A view through a lens that bends lines: `view`, and by how much (px) what is seen is off its pixels."""
 
     view: PlaneView
-    middle: NDArray[np.float64]
-    span: float
-    bend: NDArray[np.float64]
+    bend: Smooth
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map points (..., 2) in metres to pixels (..., 2)."""
         pixels = self.view.project(points)
-        return np.asarray(pixels + _terms((pixels - self.middle) / self.span, len(self.bend)) @ self.bend)
+        return pixels + self.bend.at(pixels)
 
 
-def bent_view(view: PlaneView, points: NDArray[np.float64], pixels: NDArray[np.float64]) -> BentView:
-    """Fit what the pixels (n, 2) of points (n, 2) are off the view: a cubic, or less where they are few."""
+def bent_view(
+    view: PlaneView, points: NDArray[np.float64], pixels: NDArray[np.float64], degree: int = 3
+) -> BentView:
+    """Fit what the pixels (n, 2) of points (n, 2) are off the view, by polynomials of such a degree at most."""
     seen = view.project(points)
-    middle = seen.mean(axis=0)
-    span = max(float(np.abs(seen - middle).max()), 1.0)
-    count = next(terms for terms in (10, 6, 3, 0) if len(points) >= POINTS_A_TERM * terms)
-    terms = _terms((seen - middle) / span, count)
-    bend = np.asarray(np.linalg.lstsq(terms, pixels - seen, rcond=None)[0], dtype=np.float64)
-    return BentView(view, middle, span, bend)
-
-
-def _terms(at: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Give the first so many powers x^i y^j (..., count) of places (..., 2), by growing degree."""
-    powers = [(degree - j, j) for degree in range(4) for j in range(degree + 1)][:count]
-    x, y = at[..., 0], at[..., 1]
-    return np.stack([x**i * y**j for i, j in powers], axis=-1) if powers else np.empty((*x.shape, 0))
+    return BentView(view, smooth(seen, pixels - seen, degree))
 
 
 def view_of_plane(points: NDArray[np.float64], pixels: NDArray[np.float64]) -> PlaneView | None:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.corners import corner_covariances, refine_corners
+from calib.detection.corners import measure_corners
 from calib.detection.detection import Detection
 from calib.detection.lattice import Lattice
 from calib.detection.marks import Marks, marks_of
@@ -307,8 +307,11 @@ def _measured(
     picture = Picture(np.empty((0, 0), np.uint8), window.values.astype(np.float32), window.noise)
     if isinstance(target, AprilGrid):
         return _tags(picture, marks, places, chosen, np.clip(across / 2, 1.5, 8.0))
-    pixels = refine_corners(picture, places.points[chosen].reshape(-1, 2), across)
-    return _Measured(ids, pixels, corner_covariances(picture, pixels, across))
+    points, rough = target_points(target)[ids, :2], places.points[chosen].reshape(-1, 2)
+    view = view_of_plane(points, rough)
+    if view is None:
+        return _Measured(ids[:0], np.empty((0, 2)), np.empty((0, 2, 2)))
+    return _Measured(ids, *measure_corners(picture, view, points, rough, marks.spacing, marks.clear))
 
 
 def _tags(

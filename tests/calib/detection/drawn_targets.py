@@ -93,9 +93,10 @@ def draw(
         drawing, fine_from_plate, (s * width, s * height), flags=cv2.INTER_LINEAR, borderValue=(-1.0,)
     )
     fine = np.where(fine < 0, WALL, INK + (PAPER - INK) * fine)
-    grey = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+    # A lens blurs the light before pixels gather it; the other way round, places would depend on where pixels lie.
     if blur:
-        grey = cv2.GaussianBlur(grey, (0, 0), blur)
+        fine = cv2.GaussianBlur(fine, (0, 0), s * blur)
+    grey = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
     grey = grey * (1 - shading * np.linspace(0, 1, width))
     grey = grey + noise * np.random.default_rng(seed).standard_normal(grey.shape)
     picture = np.clip(np.rint(grey), 0, 255).astype(np.uint8)

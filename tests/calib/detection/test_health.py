@@ -90,7 +90,7 @@ def test_a_motion_is_told_by_its_length_and_direction(angle):
 
 @pytest.mark.parametrize("target", ALL, ids=KINDS)
 def test_a_picture_taken_at_a_jolt_is_double(target):
-    health = health_of(moved(draw(target, **GOOD).picture, 5, 20, steps=2), target, found=False)
+    health = health_of(moved(draw(target, **GOOD, blur=0.6).picture, 5, 20, steps=2), target, found=False)
     assert "moving" in kinds(health)
 
 

@@ -1,0 +1,110 @@
+"""Fits of a drawing's grey values to the pixels round many points at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection.picture import Picture
+from calib.detection.strips import Floats, Patches, Singles
+
+Shape = Callable[[Floats], tuple[Singles, Singles]]
+
+MOST_STEPS = 12
+STANDS_STILL = 0.05  # of a shape, in px, radians, or relative; each step leaves a tenth of the one before
+LONGEST_STEP = 0.5  # the same, but at once
+ROUNDING_VARIANCE = 1 / 12
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """How the light on n pieces is expected to change over a pixel: by `slopes` (n, 2), give or take `std`.
+
+    Both are relative to the light. What few pixels across an edge tell of it they tell of the edge's place, too.
+    """
+
+    slopes: Floats
+    std: float
+
+    @classmethod
+    def unknown(cls, pieces: int) -> Light:
+        """Of any slope that is seen on targets."""
+        return cls(np.zeros((pieces, 2)), 0.005)
+
+
+@dataclass(frozen=True, eq=False)
+class GreyFit:
+    """Each piece's shape: `parameters` (n, k), their `covariances` (n, k, k), and which have `converged` (n,).
+
+    `means` (n,) are the grey values between those where the shape is 1 and those where it is -1, and `steps` (n,)
+    halves of the difference.
+    """
+
+    parameters: Floats
+    covariances: Floats
+    means: Floats
+    steps: Floats
+    converged: NDArray[np.bool_]
+
+
+def fit_grey_values(
+    picture: Picture, patches: Patches, shape: Shape, start: Floats, least: Floats, light: Light
+) -> GreyFit:
+    """Fit light x (mean + step x shape) to the pixels of each piece by Gauss-Newton steps.
+
+    `shape` gives from parameters (n, k), which are `least` (k,) or more, the drawing S (n, m) between -1 and 1, and
+    its derivatives (n, k, m). The light is a plane, 1 at the piece's origin. What the camera clips, the drawing
+    clips as well. The covariance is that of the grey values' scatter about the drawing, of rounding at the least.
+    """
+    lowest, highest = picture.values.min(), picture.values.max()
+    n, k = start.shape
+    x, y, used = patches.x, patches.y, patches.used
+    drawn, slopes = shape(start)
+    expected = np.concatenate([np.zeros((n, k + 2)), light.slopes], axis=1)
+    fitted = np.concatenate([start, _levels(drawn, patches), light.slopes], axis=1)
+    prior = np.zeros(k + 4)
+    prior[k + 2 :] = (picture.noise / light.std) ** 2
+    jacobian = np.empty((n, k + 4, used.shape[1]), dtype=np.float32)
+    for _ in range(MOST_STEPS):
+        mean, step, along_x, along_y = fitted[:, k:].T[..., None].astype(np.float32)
+        lit = 1 + along_x * x + along_y * y
+        reflected = mean + step * drawn
+        model = lit * reflected
+        counted = used * ((model > lowest) & (model < highest))
+        np.multiply(slopes, (step * lit * counted)[:, None], out=jacobian[:, :k])
+        np.multiply(lit, counted, out=jacobian[:, k])
+        np.multiply(drawn, jacobian[:, k], out=jacobian[:, k + 1])
+        reflected *= counted
+        np.multiply(x, reflected, out=jacobian[:, k + 2])
+        np.multiply(y, reflected, out=jacobian[:, k + 3])
+        residuals = used * (patches.values - np.clip(model, lowest, highest))
+        normal = (jacobian @ jacobian.swapaxes(1, 2)).astype(np.float64) + np.diag(prior)
+        # A piece without contrast has no shape to speak of; it must not keep the others from theirs.
+        normal += (1e-6 * np.diagonal(normal, axis1=1, axis2=2)[:, None] + 1e-9) * np.eye(k + 4)
+        right = (jacobian @ residuals[..., None])[..., 0] - prior * (fitted - expected)
+        change = np.linalg.solve(normal, right[..., None])[..., 0]
+        before = fitted[:, :k]
+        fitted = fitted + change
+        fitted[:, :k] = np.maximum(before + np.clip(change[:, :k], -LONGEST_STEP, LONGEST_STEP), least)
+        moved = np.abs(fitted[:, :k] - before).max(axis=1)
+        if moved.max(initial=0.0) < STANDS_STILL:
+            break
+        drawn, slopes = shape(fitted[:, :k])
+    freedom = np.maximum(used.sum(axis=1) - (k + 4), 1)
+    variance = np.maximum(np.square(residuals).sum(axis=1) / freedom, ROUNDING_VARIANCE)
+    covariances = variance[:, None, None] * np.linalg.inv(normal)[:, :k, :k]
+    converged = (moved < 5 * STANDS_STILL) & np.isfinite(fitted).all(axis=1)
+    return GreyFit(fitted[:, :k], covariances, fitted[:, k], fitted[:, k + 1], converged)
+
+
+def _levels(drawn: Singles, patches: Patches) -> Floats:
+    """Fit mean and step (n, 2) of each piece to the drawing at its start."""
+    count = np.maximum(patches.used.sum(axis=1), 1)
+    mean_drawn = (patches.used * drawn).sum(axis=1) / count
+    mean_value = (patches.used * patches.values).sum(axis=1) / count
+    spread = patches.used * (drawn - mean_drawn[:, None])
+    step = (spread * patches.values).sum(axis=1) / np.maximum((spread * drawn).sum(axis=1), 1e-9)
+    return np.column_stack([mean_value - step * mean_drawn, step])
