@@ -23,7 +23,10 @@ DriverKind = Literal["controllers", "cameras"]
 
 BUILT_IN: Final[Mapping[DriverKind, Mapping[str, str]]] = MappingProxyType(
     {
-        "controllers": {"simulated": "drivers.simulated:SimulatedController"},
+        "controllers": {
+            "cia402": "drivers.cia402:Cia402Controller",
+            "simulated": "drivers.simulated:SimulatedController",
+        },
         "cameras": {
             "replay": "drivers.video:ReplayCamera",
             "simulated": "drivers.simulated:SimulatedCamera",

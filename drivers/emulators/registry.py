@@ -11,7 +11,7 @@ from drivers.registry import DriverKind
 
 EMULATORS: Final[Mapping[DriverKind, Mapping[str, str]]] = MappingProxyType(
     {
-        "controllers": {},
+        "controllers": {"cia402": "drivers.emulators.cia402.emulator:Cia402Emulator"},
         "cameras": {
             "stream": "drivers.emulators.camera:StreamEmulator",
             "v4l2": "drivers.emulators.camera:StreamEmulator",

@@ -13,6 +13,7 @@ from calib import Calibration, load_calibration, load_session, solve, stated_cor
 from calib import calibration as calib_file
 from calib import session as calib_session
 from daemon.profile import load_profile, tables
+from drivers.cia402.options import Cia402AxisOptions, Cia402Options
 from drivers.quantities import QuantityType, parse_quantity
 from drivers.simulated import options
 from drivers.simulated.camera import SimulatedCameraOptions
@@ -41,6 +42,8 @@ MODELS: dict[str, type[BaseModel]] = {
     "In `[controllers.NAME]`:": SimulatedControllerOptions,
     "In an axis's `options`:": SimulatedAxisOptions,
     "In the camera's `options`:": SimulatedCameraOptions,
+    "### The keys of a CAN bus": Cia402Options,
+    "### The keys of a CAN servo": Cia402AxisOptions,
     "### The keys of a V4L2 camera": V4l2Options,
     "### The keys of a stream": StreamOptions,
     "### The keys of a replay": ReplayOptions,

@@ -1,0 +1,170 @@
+"""The CAN bus: opened, spoken to by one thread, and noticed when it is gone."""
+
+import asyncio
+import errno
+import logging
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final, TypeVar
+
+import can
+import canopen
+
+from drivers.cancellation import finish
+from drivers.cia402.options import Cia402Options
+from drivers.errors import DeviceLostError, DriverError
+
+Result = TypeVar("Result")
+
+_PATIENCE: Final = 0.1
+"""Seconds that a full transmit queue is given to drain."""
+_BUS_OFF: Final = 0x40
+"""Of an error frame's identifier (linux/can/error.h): the controller has left the bus."""
+
+logger = logging.getLogger(__name__)
+
+
+class Link:
+    """A bus that is open or lost. What blocks is done by `ask`, in one thread: SDOs of two would mix."""
+
+    def __init__(self, options: Cia402Options) -> None:
+        self.options = options
+        self.name = f"the CAN bus '{options.channel}' ({options.interface})"
+        self._network: Network | None = None
+        self._asking: ThreadPoolExecutor | None = None
+        self._stopping: ThreadPoolExecutor | None = None
+
+    @property
+    def network(self) -> "Network":
+        """The open network. Raises DeviceLostError where it is closed or lost."""
+        network = self._network
+        if network is None:
+            raise DeviceLostError(f"{self.name} is not open: open it first")
+        if network.loss is not None:
+            raise DeviceLostError(f"{self.name} has gone: {network.loss}; check its interface and its cable")
+        return network
+
+    async def open(self) -> None:
+        """Take the bus. Raises DeviceLostError."""
+        self._asking = ThreadPoolExecutor(1, "cia402")
+        self._stopping = ThreadPoolExecutor(1, "cia402-stop")
+        network = Network(self.options.silence)
+        try:
+            await self._in_thread(self._asking, lambda: network.open(_bus_arguments(self.options)))
+        except BaseException:
+            self._network = network
+            await self.close()
+            raise
+        self._network = network
+
+    async def close(self) -> None:
+        """Let the bus go, whatever state it is in."""
+        network, self._network = self._network, None
+        if network is not None and self._asking is not None:
+            await self._in_thread(self._asking, network.close)
+        for thread in (self._asking, self._stopping):
+            if thread is not None:
+                thread.shutdown()
+        self._asking = self._stopping = None
+
+    async def ask(self, question: Callable[["Network"], Result]) -> Result:
+        """Return what `question` returns, asked in the bus's thread, behind what is asked there already.
+
+        Raises DeviceLostError where the bus is lost, and what `question` raises.
+        """
+        network = self.network
+        assert self._asking is not None
+        return await self._in_thread(self._asking, lambda: question(network))
+
+    async def urge(self, send: Callable[["Network"], None]) -> None:
+        """Have `send` called at once, past every question. It must not wait for an answer."""
+        network = self.network
+        assert self._stopping is not None
+        await self._in_thread(self._stopping, lambda: send(network))
+
+    async def _in_thread(self, thread: ThreadPoolExecutor, work: Callable[[], Result]) -> Result:
+        return await finish(self._translated(thread, work))
+
+    async def _translated(self, thread: ThreadPoolExecutor, work: Callable[[], Result]) -> Result:
+        try:
+            return await asyncio.get_running_loop().run_in_executor(thread, work)
+        except DriverError:
+            raise  # some of them are OSErrors, too
+        except (can.CanError, OSError) as error:
+            raise DeviceLostError(f"{self.name}: {error}; check its interface and its cable") from error
+
+
+class Network(canopen.Network):  # type: ignore[misc]
+    """`canopen`'s network on a bus that may be full for a moment, or go away."""
+
+    NOTIFIER_CYCLE = 0.1
+
+    def __init__(self, silence: float) -> None:
+        super().__init__()
+        self.silence = silence
+        self.loss: str | None = None
+        """Why nothing is received any longer; None while it is."""
+        self.listeners.append(_Watch(self))
+
+    def open(self, arguments: dict[str, Any]) -> None:
+        """Take the bus that `can.Bus` makes of `arguments`."""
+        self.connect(**arguments)
+
+    def close(self) -> None:
+        """Let the bus go, whatever state it is in."""
+        bus: Any = self.bus  # type: ignore[has-type]
+        try:
+            self.disconnect()
+        except (can.CanError, OSError) as error:
+            logger.info("the bus did not close cleanly: %s", error)
+        # An adapter that was unplugged cannot be told to close, and keeps its port: it would come back elsewhere.
+        port = getattr(bus, "serialPortOrig", None)
+        if port is not None:
+            port.close()
+        self.bus = None
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        """Send a frame; where the transmit queue is full, as soon as there is room."""
+        until = time.monotonic() + _PATIENCE
+        while True:
+            try:
+                super().send_message(can_id, data, remote)
+            except can.CanOperationError as error:
+                if error.error_code != errno.ENOBUFS or time.monotonic() >= until:
+                    raise
+                time.sleep(0.001)
+            else:
+                return
+
+    def lose(self, why: str) -> None:
+        """Remember why the bus is of no more use."""
+        self.loss = self.loss or why
+
+
+class _Watch(can.Listener):
+    """Hears what `canopen` does not tell of: error frames, and the end of reception."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+
+    def on_message_received(self, msg: can.Message) -> None:
+        if msg.is_error_frame and msg.arbitration_id & _BUS_OFF:
+            self._network.lose("its controller went off the bus after too many errors")
+
+    def on_error(self, exc: Exception) -> None:
+        self._network.lose(str(exc))
+        time.sleep(_PATIENCE)  # the thread that receives tries again and again until it is closed
+
+    def stop(self) -> None:
+        pass
+
+
+def _bus_arguments(options: Cia402Options) -> dict[str, Any]:
+    arguments: dict[str, Any] = {"interface": options.interface, "channel": options.channel}
+    match options.interface:
+        case "slcan":
+            arguments |= {"bitrate": options.bitrate, "sleep_after_open": options.adapter_delay}
+        case "udp_multicast":
+            arguments |= {"hop_limit": 0} | ({} if options.port is None else {"port": options.port})
+    return arguments
