@@ -7,13 +7,17 @@ PEERS := .venv-peers
 PROFILE ?= paper-table
 DATA ?= activecam-data
 
-.PHONY: demo test lint format serve bench bench-peers figures clean
+.PHONY: demo test test-kernel lint format serve bench bench-peers figures clean
 
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
 
 test: $(VENV)/.installed-dev ## All tests but the slow suites
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+test-kernel: $(VENV)/.installed-dev ## The drivers against real kernel devices, in a virtual machine that VMRUN (a command) runs its arguments in
+	@test -n "$(VMRUN)" || { echo "make test-kernel: say what runs a command in a virtual machine, VMRUN=..."; exit 2; }
+	$(VMRUN) --udev --timeout 1800 $(BIN)/python -m pytest -p no:cacheprovider tests/kernel
 
 lint: $(VENV)/.installed-dev ## Style, types, and who imports whom
 	$(BIN)/ruff check .
