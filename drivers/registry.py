@@ -25,6 +25,7 @@ BUILT_IN: Final[Mapping[DriverKind, Mapping[str, str]]] = MappingProxyType(
     {
         "controllers": {
             "cia402": "drivers.cia402:Cia402Controller",
+            "grbl": "drivers.grbl:GrblController",
             "simulated": "drivers.simulated:SimulatedController",
         },
         "cameras": {

@@ -11,7 +11,10 @@ from drivers.registry import DriverKind
 
 EMULATORS: Final[Mapping[DriverKind, Mapping[str, str]]] = MappingProxyType(
     {
-        "controllers": {"cia402": "drivers.emulators.cia402.emulator:Cia402Emulator"},
+        "controllers": {
+            "cia402": "drivers.emulators.cia402.emulator:Cia402Emulator",
+            "grbl": "drivers.emulators.grbl:GrblEmulator",
+        },
         "cameras": {
             "stream": "drivers.emulators.camera:StreamEmulator",
             "v4l2": "drivers.emulators.camera:StreamEmulator",

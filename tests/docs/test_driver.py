@@ -67,7 +67,12 @@ def test_a_profile_names_the_driver(package: Path, tmp_path: Path) -> None:
     snippet = next(block.text for block in blocks(PAGE, "toml") if block.text.startswith("[[axes]]"))
     whole = next(block.text for block in blocks("reference/files.md", "toml"))
     head, _, rest = whole.partition("[[axes]]")
-    rest = rest.partition("[camera]")[2].replace("40 deg", "1 mm").replace("-1 mm", "0 mm")
+    rest = (
+        rest.partition("[camera]")[2]
+        .replace("time_scale = 20.0\n", "")
+        .replace("40 deg", "1 mm")
+        .replace("-1 mm", "0 mm")
+    )
     rest = re.sub(r"readings = .*", 'readings = ["0.5 mm", "1.5 mm"]', rest)
     rest = rest.replace("time_scale = 20.0\n", "")  # what is real keeps the pace of life
     rig = tmp_path / "rig.toml"

@@ -14,6 +14,7 @@ from calib import calibration as calib_file
 from calib import session as calib_session
 from daemon.profile import load_profile, tables
 from drivers.cia402.options import Cia402AxisOptions, Cia402Options
+from drivers.grbl.options import GrblAxisOptions, GrblOptions
 from drivers.quantities import QuantityType, parse_quantity
 from drivers.simulated import options
 from drivers.simulated.camera import SimulatedCameraOptions
@@ -44,6 +45,8 @@ MODELS: dict[str, type[BaseModel]] = {
     "In the camera's `options`:": SimulatedCameraOptions,
     "### The keys of a CAN bus": Cia402Options,
     "### The keys of a CAN servo": Cia402AxisOptions,
+    "### The keys of a Grbl controller": GrblOptions,
+    "### The keys of a Grbl axis": GrblAxisOptions,
     "### The keys of a V4L2 camera": V4l2Options,
     "### The keys of a stream": StreamOptions,
     "### The keys of a replay": ReplayOptions,

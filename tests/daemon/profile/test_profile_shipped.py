@@ -41,7 +41,14 @@ def _nearest(points: NDArray[np.float64]) -> float:
 
 
 def test_all_of_them_are_there() -> None:
-    assert shipped_profiles() == ("cia402-pan-tilt", "pan-tilt", "paper-table", "six-axis-arm", "turntable")
+    assert shipped_profiles() == (
+        "cia402-pan-tilt",
+        "grbl-table",
+        "pan-tilt",
+        "paper-table",
+        "six-axis-arm",
+        "turntable",
+    )
 
 
 def test_the_whole_paper_is_in_every_picture(profile: Profile, world: SimulatedWorld) -> None:
