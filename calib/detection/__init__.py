@@ -1,7 +1,7 @@
 """Finding a printed target's points in a picture.
 
 picture      what a camera gave, as grey values to search and to measure in
-circle_grid  symmetric and asymmetric grids of disks;  disks: their centroids on the grey values
+circle_grid  symmetric and asymmetric grids of disks;  ordering: of the blobs;  disks: centroids on the grey values
 chessboard   its inner corners
 charuco      chessboard corners, numbered by markers;  corners: both kinds' corners on the grey values
 aprilgrid    corners of tags;  tag_edges: the lines that cross in them

@@ -35,8 +35,8 @@ def detect(image: NDArray[np.generic], target: Target) -> Detection:
     except cv2.error as error:
         # OpenCV's finders assert on some pictures in which there is no target.
         raise DetectionError(
-            f"the search of the picture for the {target.kind} broke off ({error.err}): is the target in it?"
-            f"{_likely_reason(image, target)}"
+            f"the {target.kind} was not found: the search broke off in the picture of {picture.size}; is the "
+            f"target in it?{_likely_reason(image, target)}"
         ) from error
     except DetectionError as error:
         raise DetectionError(f"{error}{_likely_reason(image, target)}") from error

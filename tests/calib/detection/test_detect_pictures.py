@@ -126,7 +126,7 @@ def test_a_grid_partly_out_of_view_is_not_found(target):
 
 def test_a_grid_of_other_numbers_is_not_taken_for_the_target():
     picture = draw(CircleGrid(rows=6, columns=6, pitch=0.03, disk_diameter=0.018), fill=0.6).picture
-    with pytest.raises(DetectionError, match="of its 42 disks at most 36"):
+    with pytest.raises(DetectionError, match="at most 36 blobs were seen together"):
         detect(picture, CIRCLES)
 
 

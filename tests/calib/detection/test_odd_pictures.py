@@ -1,7 +1,9 @@
 """Half a target, two of them, one among other things, one in a strip: the right points, or a refusal in words."""
 
+import time
 from functools import lru_cache
 
+import cv2
 import numpy as np
 import pytest
 from drawn_targets import WALL, Drawn, draw
@@ -85,6 +87,68 @@ def test_a_strip_is_a_picture_without_a_target(target, shape):
     stripes = np.where(np.indices(shape).sum(axis=0) // 20 % 2, 200, 30).astype(np.uint8)
     with pytest.raises(DetectionError, match=r"is it in|is the target in it|whole"):
         detect(stripes, target)
+
+
+@pytest.mark.parametrize("target", ALL, ids=KINDS)
+def test_a_search_that_breaks_off_is_told_in_our_words(target, monkeypatch):
+    def assert_something(*_):
+        raise cv2.error("OpenCV(9.9.9) /there/some.cpp:42: error: (-215:Assertion failed) ok in function 'f'")
+
+    monkeypatch.setattr("calib.detection.detector._detect", assert_something)
+    with pytest.raises(
+        DetectionError, match=f"the {target.kind} was not found: the search broke off"
+    ) as told:
+        detect(np.random.default_rng(0).integers(0, 255, (32, 640), dtype=np.uint8), target)
+    assert "OpenCV" not in str(told.value)
+    assert "Assertion" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "target", [*ALL[:2], CircleGrid(rows=20, columns=20, pitch=0.03, disk_diameter=0.018)]
+)
+def test_a_busy_picture_does_not_keep_the_search_for_disks_busy(target):
+    noise = np.random.default_rng(0).integers(0, 256, (1200, 1600), dtype=np.uint8)
+    letters = np.full((960, 1280), 235, dtype=np.uint8)
+    for y in range(20, 960, 18):
+        cv2.putText(
+            letters, "o.o. 0123 ooo 8B8 " * 8, (5, y), cv2.FONT_HERSHEY_SIMPLEX, 0.5, 20, 1, cv2.LINE_AA
+        )
+    y, x = np.indices((960, 1280))
+    holes = np.where(np.hypot(y % 24 - 12, x % 24 - 12) < 7, 20, 235).astype(np.uint8)
+    for picture in (noise, letters, holes):
+        begun = time.process_time()
+        with pytest.raises(DetectionError, match="was not found"):
+            detect(picture, target)
+        assert time.process_time() - begun < 4
+
+
+@pytest.mark.parametrize("target", ALL[:2], ids=KINDS[:2])
+def test_a_grid_of_another_size_is_not_taken_for_a_part_of_it(target):
+    picture = drawn_once(target, tilt=(20, 10), fill=0.6, noise=1).picture
+    for rows, columns in ((-1, 0), (0, -1), (-1, -1), (1, 0), (0, 1), (-2, 0)):
+        other = target.model_copy(
+            update={"rows": target.rows + rows, "columns": target.columns + columns, "pitch": target.pitch}
+        )
+        if {other.rows, other.columns} == {target.rows, target.columns}:
+            continue
+        with pytest.raises(DetectionError, match=r"more rows or columns|blobs were seen together"):
+            detect(picture, other)
+
+
+@pytest.mark.parametrize("target", ALL[:2], ids=KINDS[:2])
+def test_a_grid_among_letters_and_dirt_is_found(target):
+    drawn = drawn_once(target, tilt=(20, 10), fill=0.5, noise=1)
+    picture = cv2.copyMakeBorder(drawn.picture, 100, 100, 100, 100, cv2.BORDER_CONSTANT, value=235)
+    for y in (30, 60, 90, 610, 640, 670):
+        cv2.putText(
+            picture, "ooo 0123 ... 8B8 " * 4, (5, y), cv2.FONT_HERSHEY_SIMPLEX, 0.6, 20, 2, cv2.LINE_AA
+        )
+    corner = readings(drawn, target)[0][0] + 100
+    apart = np.linalg.norm(readings(drawn, target)[0][1] + 100 - corner)
+    for way in (0.5, 0.8):
+        place = np.rint(corner - way * apart).astype(int).tolist()
+        cv2.circle(picture, place, 4, 30, -1, cv2.LINE_AA)
+    assert found_or_refused(picture, target, [truth + 100 for truth in readings(drawn, target)])
 
 
 @pytest.mark.parametrize("target", ALL, ids=KINDS)
