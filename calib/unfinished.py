@@ -69,7 +69,8 @@ def _where_others_stand(session: Session, done: Mask, rest: NDArray[np.float64])
     """Return `session` with the joints `done` (m,) alone, and its views (n,): those with the others at `rest` (m,)."""
     readings = session.readings()
     exercised = PoseViews.of(session, range(len(readings)), np.zeros((len(readings), 4, 4))).exercised
-    slack = SAME_START * np.maximum(reading_spans(readings, exercised), 1e-12)
+    spans = reading_spans(np.vstack([readings, rest]), np.append(exercised, -1))
+    slack = SAME_START * np.maximum(spans, 1e-12)
     kept: Mask = np.asarray((np.abs(readings - rest) <= slack)[:, ~done].all(axis=1))
     left_out = [joint for joint, finished in zip(session.joints, done, strict=True) if not finished]
     names = [joint.name for joint, finished in zip(session.joints, done, strict=True) if finished]
