@@ -15,6 +15,7 @@ data flows through them:
     transforms, twists, chain    rigid motions, and the chain as a product of exponentials
     sweeps, screws, closed_form  the paper's method;  orientation  of symmetric targets;  first_solution  all of it
     nominal, unfinished          sessions with a drawing, and sessions that were cut off
+    prediction, second_look      where the target should be, and what is found of it there
     likelihood/, most_likely     the fit;  advice  what it does not tell, in words
     corrections, warp, pose_sensor               imperfect joints, targets and sensors
     stated_corrections, corrections_in_words     what they are, said;  stated_quality  and how good it is

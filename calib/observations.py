@@ -1,12 +1,12 @@
 """What was measured, as arrays: each view's points found in its picture, or given, or its pose."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection import detect_in_all
+from calib.detection import Detection, detect_in_all
 from calib.errors import DetectionError, ImageError, UnsolvableError
 from calib.picture_file import load_picture
 from calib.session import Session, View
@@ -44,14 +44,24 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A session's observations, and a sentence for each view that gave none, or whose frames disagree."""
+    """A session's observations, in the order of its views.
+
+    `unseen` says of each view, by place, in which the target was not found why that was, `remarks` of others what a
+    person should know.
+    """
 
     observations: list[Observation]
-    warnings: list[str]
+    unseen: dict[int, str]
+    remarks: dict[int, str]
 
     def of(self, views: set[int]) -> list[Observation]:
         """Return the observations of these views."""
         return [observation for observation in self.observations if observation.view in views]
+
+    def warnings(self, session: Session) -> list[str]:
+        """Return a sentence for each view of `session` that there is something to be said of."""
+        said = sorted([*self.unseen.items(), *self.remarks.items()])
+        return [f"view {view} ({session.views[view].image}): {sentence}" for view, sentence in said]
 
 
 def observe(
@@ -65,24 +75,25 @@ def observe(
     """
     if not session.views:
         raise UnsolvableError("the session has no views: take some before solving it")
-    observations: list[Observation] = []
-    warnings: list[str] = []
+    observed = Observed([], {}, {})
     wanted = range(len(session.views)) if only is None else only
     for count, index in enumerate(wanted, start=1):
         view = session.views[index]
         if progress is not None and view.image is not None:
             progress(f"looking for the target in view {count} of {len(wanted)}")
         try:
-            observation, warning = _observation(session, index, view)
+            observation, remark = _observation(session, index, view)
         except DetectionError as error:
-            warnings.append(f"view {index} ({view.image}): {error}")
+            observed.unseen[index] = str(error)
             continue
-        observations.append(observation)
-        if warning is not None:
-            warnings.append(f"view {index} ({view.image}): {warning}")
-    if not observations:
-        raise UnsolvableError(f"the target was not found in any of the {len(wanted)} views: {warnings[0]}")
-    return Observed(observations, warnings)
+        observed.observations.append(observation)
+        if remark is not None:
+            observed.remarks[index] = remark
+    if not observed.observations:
+        raise UnsolvableError(
+            f"the target was not found in any of the {len(wanted)} views: {observed.warnings(session)[0]}"
+        )
+    return observed
 
 
 def _observation(session: Session, index: int, view: View) -> tuple[Observation, str | None]:
@@ -96,18 +107,25 @@ def _observation(session: Session, index: int, view: View) -> tuple[Observation,
         ids = np.array(view.points.ids, dtype=np.int64)
         pixels = np.array(view.points.pixels, dtype=float).reshape(-1, 2)
         return Observation(index, camera, ids, pixels, disk=view.points.disk == "centroid"), None
-    pictures = (_picture(session, name) for name in view.frames)
-    averaged = detect_in_all(pictures, session.target)
-    detection = averaged.detection
-    observation = Observation(
-        view=index,
+    averaged = detect_in_all(pictures(session, view), session.target)
+    return observed_in(averaged.detection, index, camera), averaged.warning
+
+
+def observed_in(detection: Detection, view: int, camera: int) -> Observation:
+    """Return what was found in the pictures of a view, by its place and its camera's."""
+    return Observation(
+        view=view,
         camera=camera,
         ids=detection.ids,
         pixels=detection.pixels,
         disk=detection.disk == "centroid",
         covariances=detection.covariances,
     )
-    return observation, averaged.warning
+
+
+def pictures(session: Session, view: View) -> Iterator[NDArray[np.generic]]:
+    """Yield a view's pictures as they are on disk; raises ImageError that names the file."""
+    return (_picture(session, name) for name in view.frames)
 
 
 def _picture(session: Session, name: str) -> NDArray[np.generic]:

@@ -14,7 +14,9 @@ from calib.nominal import nominal_solution
 from calib.observations import Observation, Progress, observe
 from calib.orientation import undecided_in_words
 from calib.parameters import Held
+from calib.prediction import predicted_by_views
 from calib.quality import judged
+from calib.second_look import second_look
 from calib.session import Session
 from calib.solution import Solution
 from calib.stated_quality import Quality
@@ -40,7 +42,12 @@ def solve(
     would help, and ImageError for a missing picture.
     """
     session, cut_off = finished_part(session.holding(hold or {}))
-    observed = observe(session, progress)
+    observed = second_look(
+        session,
+        observe(session, progress),
+        lambda seen, view: predicted_by_views(session, seen, view.readings, session.camera_index(view)),
+        progress,
+    )
     if progress is not None:
         progress("solving")
     fit = [o for o in observed.observations if session.views[o.view].use == "fit"]
@@ -62,7 +69,7 @@ def solve(
             warnings += lens_in_words(camera.name, std)
     points = target_points(session.target)
     warnings += [*left_out_in_words(solution), *unused_warp_in_words(solution.unused_warp, points)]
-    warnings += observed.warnings
+    warnings += observed.warnings(session)
     calibration = document(session, method, solution, Quality())
     known = session.approached_from(solution.sides)
     quality = judged(calibration, known, observed.observations, solution, warnings)

@@ -16,7 +16,9 @@ from calib.calibration import Calibration
 from calib.closed_form import PoseViews
 from calib.errors import FormatError
 from calib.observations import Progress, observe
+from calib.prediction import predicted_by_calibration
 from calib.residuals import ViewResidual, view_residuals
+from calib.second_look import second_look
 from calib.session import JointKind, Session
 from calib.sweeps import sweep_labels
 from calib.transforms import inverse, rotation_log
@@ -100,7 +102,12 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
     _require_same_rig(calibration, session)
     marked = any(view.use == "verify" for view in session.views)
     judged = [index for index, view in enumerate(session.views) if view.use == "verify" or not marked]
-    observed = observe(session, progress, judged)
+    observed = second_look(
+        session,
+        observe(session, progress, judged),
+        lambda _, view: predicted_by_calibration(calibration, session, view),
+        progress,
+    )
     residuals = view_residuals(calibration, session, observed.observations, measure_pose=True)
     errors = np.concatenate([residual.errors for residual in residuals])
     placed = bool(calibration.joints)
@@ -113,7 +120,7 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
         rotation_rad=_spread([residual.rotation for residual in residuals]),
         per_view=[_verdict(session, residual) for residual in residuals],
         travel=_travels(calibration, session, residuals) if placed else [],
-        warnings=observed.warnings,
+        warnings=observed.warnings(session),
     )
 
 

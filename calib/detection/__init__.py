@@ -14,7 +14,7 @@ health       how good a picture is to measure in;  edges: how wide they are;  he
 inspection   both at once
 """
 
-from calib.detection.averaging import Averaged, detect_in_all
+from calib.detection.averaging import Averaged, detect_in_all, track_in_all
 from calib.detection.detection import Detection
 from calib.detection.detector import detect
 from calib.detection.health import PictureHealth, picture_health
@@ -35,4 +35,5 @@ __all__ = [
     "inspect",
     "picture_health",
     "track",
+    "track_in_all",
 ]

@@ -11,7 +11,7 @@ claimed covariances the scatter is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from calib.detection.detection import Detection
 from calib.detection.detector import detect
+from calib.detection.tracking import Prediction, track
 from calib.errors import DetectionError
 from calib.targets import Target, target_points, target_symmetries
 
@@ -64,10 +65,26 @@ def detect_in_all(images: Iterable[NDArray[np.generic]], target: Target) -> Aver
     Frames in which the target is not found are left out. Raises DetectionError, the first frame's, where it is
     found in none.
     """
+    return _in_all(images, target, lambda image: detect(image, target))
+
+
+def track_in_all(images: Iterable[NDArray[np.generic]], target: Target, predicted: Prediction) -> Averaged:
+    """Measure the target's points in frames of one view where they are predicted, and average them.
+
+    Frames are left out, and DetectionError is raised, as by `detect_in_all`.
+    """
+    return _in_all(images, target, lambda image: track(image, target, predicted))
+
+
+def _in_all(
+    images: Iterable[NDArray[np.generic]],
+    target: Target,
+    look: Callable[[NDArray[np.generic]], Detection],
+) -> Averaged:
     detections, failure = [], None
     for image in images:
         try:
-            detections.append(detect(image, target))
+            detections.append(look(image))
         except DetectionError as error:
             failure = failure or error
     if not detections:

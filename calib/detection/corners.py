@@ -74,7 +74,9 @@ def measure_corners(
         picture = replace(picture, values=np.asarray(softened, dtype=np.float32))
         blurs = np.hypot(blurs, SOFTENING)
 
-    crossings = _crossings(bent_view(view, points[good], pixels[good], BENDS_DEGREE), points, pixels, pitch, clear)
+    crossings = _crossings(
+        bent_view(view, points[good], pixels[good], BENDS_DEGREE), points, pixels, pitch, clear
+    )
     levels = np.log(np.maximum(rough.means + np.abs(rough.steps), 1))
     light = _light(pixels, levels, good, float(np.median(crossings.lengths)))
     blur = float(np.median(blurs))
