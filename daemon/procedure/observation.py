@@ -1,13 +1,23 @@
 """One view: go there, stand, settle, take frames exposed after that, and find the target in them."""
 
-import asyncio
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from calib.detection import Averaged, Fault, detect_in_all, faults, picture_health
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection import (
+    Averaged,
+    Fault,
+    Prediction,
+    detect_in_all,
+    faults,
+    picture_health,
+    track_in_all,
+)
 from calib.errors import DetectionError
 from calib.targets import Target
 from daemon.rig import Rig, RigSnapshot, Side
@@ -16,15 +26,12 @@ from drivers.errors import DeviceFaultError, MotionError
 
 
 @dataclass(frozen=True, slots=True)
-class Observation:
-    """Frames in which the target was found, and the readings (chain order) at which they were taken."""
+class Taken:
+    """Frames of one view, and the readings (chain order) at which they were taken."""
 
     frames: list[Frame]
     readings: list[float]
     approached: list[Side]
-    seen: Averaged
-    faults: tuple[Fault, ...]
-    """What is wrong with the first frame all the same."""
     taken_at: datetime
     settled: float
     """Seconds of the rig's clock between the confirmed standstill and the first exposure."""
@@ -37,6 +44,16 @@ class Observation:
             "time": self.taken_at.isoformat(timespec="milliseconds").replace("+00:00", "Z"),
             "settle": {"settled_s": self.settled, "exposure_s": self.frames[0].exposure},
         }
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """Frames in which the target was found."""
+
+    taken: Taken
+    seen: Averaged
+    faults: tuple[Fault, ...]
+    """What is wrong with the first frame all the same."""
 
 
 class Observer:
@@ -61,11 +78,10 @@ class Observer:
                     "clear the way and home it"
                 )
 
-    async def look(self) -> Observation:
-        """Wait until the rig has settled, take the frames, and find the target in them.
+    async def take(self) -> Taken:
+        """Wait until the rig has settled, and take the frames.
 
-        Raises DetectionError where the target is found in none, MotionError where an axis moves meanwhile, and
-        what `Rig.frame` raises.
+        Raises MotionError where an axis moves meanwhile, and what `Rig.frame` raises.
         """
         clock = self._rig.clock
         stood_at = (await self._standing()).timestamp
@@ -74,13 +90,10 @@ class Observer:
         assert stood_at is not None
         frames = await self._frames(after=clock.now())
         self._require_unmoved(settled, await self._standing())
-        seen, found = await asyncio.to_thread(_seen, frames, self._rig.profile.target)
-        return Observation(
+        return Taken(
             frames=frames,
             readings=[position for position in settled.readings if position is not None],
             approached=list(settled.approached),
-            seen=seen,
-            faults=found,
             taken_at=self._rig.utc.at(frames[0].timestamp),
             settled=frames[0].timestamp - stood_at,
         )
@@ -122,8 +135,23 @@ class Observer:
                 )
 
 
-def _seen(frames: list[Frame], target: Target) -> tuple[Averaged, tuple[Fault, ...]]:
-    seen = detect_in_all((frame.image for frame in frames), target)
+def find(taken: Taken, target: Target) -> Observation:
+    """Look for the target in all frames; raises DetectionError where it is found in none."""
+    return _observation(taken, target, detect_in_all(_images(taken), target))
+
+
+def find_where_predicted(taken: Taken, target: Target, predicted: Prediction) -> Observation:
+    """Look for the target where it should be, which finds what is seen of it; raises DetectionError."""
+    return _observation(taken, target, track_in_all(_images(taken), target, predicted))
+
+
+def _images(taken: Taken) -> Iterator[NDArray[np.generic]]:
+    return (frame.image for frame in taken.frames)
+
+
+def _observation(taken: Taken, target: Target, seen: Averaged) -> Observation:
     if len(seen.detection.ids) == 0:
         raise DetectionError("no point of the target was found in the picture")
-    return seen, tuple(faults(picture_health(frames[0].image, target, seen.detection)))
+    return Observation(
+        taken, seen, tuple(faults(picture_health(taken.frames[0].image, target, seen.detection)))
+    )

@@ -2,18 +2,25 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, cast
 
-from calib.errors import DetectionError
+from calib.errors import CalibError, DetectionError
+from calib.observations import Observation as ViewObservation
+from calib.observations import observed_in
+from calib.second_look import partly_seen
+from calib.session import Session
 from calib.session_writer import Picture, SessionWriter
 from daemon.errors import TargetUnseenError
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Homing, JointStarted, Moving, Planned, Use, ViewTaken, Warned
-from daemon.procedure.observation import Observation, Observer
+from daemon.procedure.observation import Observation, Observer, Taken, find, find_where_predicted
 from daemon.profile import FreeView, Sweep
 from daemon.rig import Rig
 from drivers.cancellation import finish
 
+MOST_KEPT = 8
+"""Positions of a sweep whose frames are kept to be looked at again at its end."""
 FEWEST_VIEWS = 2
 """Positions of a fit sweep at which the target must be seen: one shows no motion of the joint."""
 
@@ -33,6 +40,8 @@ class Survey:
         self._positions = sum(1 for _ in self._procedure.planned_views())
         self._position = 0
         self._told: set[str] = set()  # the kinds of faults that were told of in this sweep
+        self._seen: list[ViewObservation] = []
+        self._unseen: list[_Unseen] = []
 
     async def take(self) -> None:
         """Home what is not homed, then take every view.
@@ -67,6 +76,7 @@ class Survey:
         seen = 0
         for reading in sweep.readings:
             seen += await self._view({sweep.joint: reading}, sweep.joint, sweep.use)
+        seen += await self._look_again()
         if sweep.use == "fit" and seen < FEWEST_VIEWS:
             raise TargetUnseenError(
                 f"the target was found at {seen} of {len(sweep.readings)} positions of '{sweep.joint}', "
@@ -79,6 +89,7 @@ class Survey:
         self._told.clear()
         for view in views:
             await self._view(view.readings, None, view.use)
+        await self._look_again()
 
     async def _view(self, targets: Mapping[str, float], joint: str | None, use: Use) -> bool:
         """Take one view; return whether the target was found."""
@@ -86,14 +97,49 @@ class Survey:
         self._position += 1
         self._log.add(Moving(position=self._position, of=self._positions, targets=dict(targets)))
         await self._observer.go(targets)
-        observation = await self._look_twice()
-        if observation is None:
-            return False
-        await self._store(observation, joint, use)
-        self._warn(observation)
-        return True
+        spot = _Spot(self._position, joint, use)
+        for first in (True, False):
+            taken = await self._observer.take()
+            try:
+                observation = await asyncio.to_thread(find, taken, self._rig.profile.target)
+            except DetectionError as error:
+                if not first:  # a picture can be spoilt by what passes by; a second one tells
+                    self._unseen.append(_Unseen(spot, taken, str(error)))
+            else:
+                await self._store(observation, spot)
+                self._warn(observation, spot)
+                return True
+        if len(self._unseen) > MOST_KEPT:
+            self._leave_out(self._unseen.pop(0))
+        return False
 
-    def _warn(self, observation: Observation) -> None:
+    async def _look_again(self) -> int:
+        """Look where the other views predict it for the target that was not found; return in how many views it is.
+
+        A grid without numbers that is partly out of the picture is not found otherwise.
+        """
+        count, found = 0, True
+        while found:
+            found = False
+            for unseen in list(self._unseen):
+                session, seen = self._writer.session, list(self._seen)
+                try:
+                    observation = await asyncio.to_thread(_where_predicted, unseen.taken, session, seen)
+                except CalibError:
+                    continue
+                self._unseen.remove(unseen)
+                await self._store(observation, unseen.spot)
+                self._tell(unseen.spot, partly_seen(observation.seen.detection, session.target))
+                self._warn(observation, unseen.spot)
+                count, found = count + 1, True
+        while self._unseen:
+            self._leave_out(self._unseen.pop(0))
+        return count
+
+    def _leave_out(self, unseen: "_Unseen") -> None:
+        self._log.add(Warned(message=f"{self._where(unseen.spot)} is left out: {unseen.problem}"))
+
+    def _warn(self, observation: Observation, spot: "_Spot") -> None:
         """Tell of pictures that are worse than they should be, of each kind of fault once a sweep."""
         found: dict[str, str] = {fault.kind: fault.message for fault in observation.faults if fault.spoils}
         if observation.seen.warning is not None:
@@ -101,39 +147,61 @@ class Survey:
         for kind, message in found.items():
             if kind not in self._told:
                 self._told.add(kind)
-                where = f"position {self._position} of {self._positions}"
-                self._log.add(Warned(message=f"{where} is measured all the same: {message}"))
+                self._tell(spot, message)
 
-    async def _look_twice(self) -> Observation | None:
-        try:
-            return await self._observer.look()
-        except DetectionError:
-            pass  # a picture can be spoilt by what passes by; a second one tells
-        try:
-            return await self._observer.look()
-        except DetectionError as error:
-            where = f"position {self._position} of {self._positions}"
-            self._log.add(Warned(message=f"{where} is left out: {error}"))
-            return None
+    def _tell(self, spot: "_Spot", message: str) -> None:
+        self._log.add(Warned(message=f"{self._where(spot)} is measured all the same: {message}"))
 
-    async def _store(self, observation: Observation, joint: str | None, use: Use) -> None:
-        fields: dict[str, Any] = {"joint": joint, "use": use, **observation.view_fields()}
+    def _where(self, spot: "_Spot") -> str:
+        return f"position {spot.position} of {self._positions}"
+
+    async def _store(self, observation: Observation, spot: "_Spot") -> None:
+        taken, detection = observation.taken, observation.seen.detection
+        fields: dict[str, Any] = {"joint": spot.joint, "use": spot.use, **taken.view_fields()}
+        pictures = [cast("Picture", frame.image) for frame in taken.frames]  # a camera's are 8 or 16 bits
         # Finished even when cancelled, so that what the writer holds is what is on disk.
-        pictures = [
-            cast("Picture", frame.image) for frame in observation.frames
-        ]  # a camera's are 8 or 16 bits
         view = await finish(asyncio.to_thread(self._writer.add_pictures, pictures, **fields))
         assert view.image is not None
+        place = len(self._writer.session.views) - 1
+        self._seen.append(observed_in(detection, place, self._writer.session.camera_index(view)))
         self._log.add(
             ViewTaken(
-                position=self._position,
+                position=spot.position,
                 of=self._positions,
-                view=len(self._writer.session.views) - 1,
-                joint=joint,
-                use=use,
-                readings=observation.readings,
-                points=len(observation.seen.detection.ids),
+                view=place,
+                joint=spot.joint,
+                use=spot.use,
+                readings=taken.readings,
+                points=len(detection.ids),
                 frames=observation.seen.frames,
                 image=view.image,
             )
         )
+
+
+@dataclass(frozen=True, slots=True)
+class _Spot:
+    """A position of the plan, which counts them from 1, and what its view is for."""
+
+    position: int
+    joint: str | None
+    use: Use
+
+
+@dataclass(frozen=True, slots=True)
+class _Unseen:
+    """Frames in which the target was not found, and why."""
+
+    spot: _Spot
+    taken: Taken
+    problem: str
+
+
+def _where_predicted(taken: Taken, session: Session, seen: list[ViewObservation]) -> Observation:
+    """Find the target where the views `seen` of `session` predict it; raises CalibError."""
+    from calib.prediction import (
+        predicted_by_views,
+    )  # it brings scipy, which a daemon that serves poses does without
+
+    predicted = predicted_by_views(session, seen, taken.readings)
+    return find_where_predicted(taken, session.target, predicted)

@@ -62,8 +62,8 @@ positions = {positions}
 
 [[procedure.sweeps]]
 joint = "pan"
-from = "-12 deg"
-to = "12 deg"
+from = "-{reach} deg"
+to = "{reach} deg"
 positions = {positions}
 start = {{ slide = "50 mm" }}
 
@@ -116,6 +116,7 @@ def write_profile(
     velocity: float = 100.0,
     max_reading_age: str = "2 s",
     defocus: str = "0.5 px",
+    reach: float = 12.0,
 ) -> Path:
     """Write the small rig's profile into `folder` and return the file."""
     path = folder / "small-rig.toml"
@@ -127,6 +128,7 @@ def write_profile(
             velocity=velocity,
             max_reading_age=max_reading_age,
             defocus=defocus,
+            reach=reach,
         ),
         encoding="utf-8",
     )

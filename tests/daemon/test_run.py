@@ -16,6 +16,7 @@ from calib import load_calibration, load_session
 from calib.detection import Averaged, detect_in_all
 from calib.errors import DetectionError, UnsolvableError
 from calib.targets import Target
+from calib.transforms import pose_error
 from daemon.errors import (
     LeaseHeldError,
     RigFaultError,
@@ -312,9 +313,17 @@ class TestATargetHardToSee:
         assert len(of(events, "view")) == 10
 
     async def test_a_position_is_left_out_after_two(
-        self, service: Service, blind: Callable[[set[int]], None]
+        self,
+        service: Service,
+        blind: Callable[[set[int]], None],
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         blind({2, 3})
+
+        def track(*_: object) -> None:
+            raise DetectionError("not where it should be either")
+
+        monkeypatch.setattr("daemon.procedure.observation.track_in_all", track)
         run, events = await finish(service, await service.runs.start())
         assert run.state is RunState.SUCCEEDED
         (warning,) = of(events, "warning")
@@ -322,6 +331,49 @@ class TestATargetHardToSee:
         session = load_session(service.store.session_folder(run))
         assert len(session.views) == 9
         assert [view.image for view in session.views] == [f"frames/{index:04d}.png" for index in range(9)]
+
+    async def test_a_position_is_looked_at_again_where_the_others_of_its_sweep_predict_the_target(
+        self, service: Service, blind: Callable[[set[int]], None]
+    ) -> None:
+        blind({2, 3})
+        run, events = await finish(service, await service.runs.start())
+        assert run.state is RunState.SUCCEEDED
+        (warning,) = of(events, "warning")
+        assert warning.message == (
+            "position 2 of 10 is measured all the same: "
+            "20 of the target's 20 points are seen, and measured where they are predicted"
+        )
+        # It is told of when the sweep is done, and keeps its position's readings.
+        assert [event.position for event in of(events, "view")][:5] == [1, 3, 4, 2, 5]
+        session = load_session(service.store.session_folder(run))
+        assert session.views[3].readings[0] == pytest.approx(100 / 3, abs=0.05)
+        assert [view.joint for view in session.views[:5]] == ["slide"] * 4 + ["pan"]
+
+    async def test_a_target_that_is_partly_out_of_the_picture_counts_with_the_points_that_are_in_it(
+        self, tmp_path: Path
+    ) -> None:
+        """At the ends of the pan's sweep columns of disks are missing, and then the grid is not found as a whole."""
+        profile = small_rig(tmp_path, positions=7, reach=19.5)
+        async with running_service(profile, tmp_path / "data") as service:
+            run, events = await finish(service, await service.runs.start())
+            assert run.state is RunState.SUCCEEDED, run.error
+            world, folder = service.rig.world, service.store.session_folder(run)
+            assert world is not None
+            partial = {event.position: event.points for event in of(events, "view") if event.points < 20}
+            assert sorted(partial) == [8, 14]
+            told = [event.message for event in of(events, "warning")]
+            for position, points in partial.items():
+                assert (
+                    f"position {position} of 16 is measured all the same: {points} of the target's 20 points "
+                    "are seen, and measured where they are predicted"
+                ) in told
+            session, calibration = load_session(folder), load_calibration(folder / "calibration.json")
+            assert len(session.views) == 16
+            assert [view.view for view in calibration.quality.views] == list(range(16))
+            readings = np.array([[50.0, pan] for pan in np.linspace(-19, 19, 9)])
+            true = np.array([world.world_from_camera(at) for at in readings])
+            _, angle = pose_error(calibration.world_from_camera(readings), true)
+            assert angle.max() < 2e-3
 
     async def test_a_sweep_with_one_view_fails_the_run(
         self, service: Service, blind: Callable[[set[int]], None]
