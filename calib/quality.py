@@ -111,6 +111,7 @@ def judged(
         held_out_rotation_rad=out.rotation,
         held_out_by=held_out_by if held_out else None,
         noise_px=solution.noise_px,
+        predicted_px=solution.refined.predicted_miss() if solution.refined else None,
         position_std_m=position,
         rotation_std_rad=rotation,
         coverage=_coverage(calibration, session, [o for o in observations if o.view in fitted]),

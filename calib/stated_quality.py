@@ -83,6 +83,8 @@ class Quality(Document):
     """A sentence for each of the calibration's corrections."""
     noise_px: Number | None = None
     """How much single points scatter (rms) where their view's pose is free: no prediction can be better."""
+    predicted_px: Number | None = None
+    """How far predictions should miss (rms): by that, by the readings' noise, and by what the fit is not sure of."""
     position_std_m: MeanAndMax | None = None
     rotation_std_rad: MeanAndMax | None = None
     """How sure the camera's pose is at the fit's readings, the three directions together."""

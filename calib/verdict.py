@@ -4,8 +4,9 @@ The residual of a fit says how well a model bends to the views that it was bent 
 verdict goes by views that were held out, by how sure the fit is of the poses that it gives, and by what it cannot tell:
 
     unknown   nothing was held out, and nothing is known to be wrong either
-    poor      a prediction misses by more than 3 times as much as the fit; by more than a pixel and 10 times the noise
-              of single points; more than a fifth of the views was set aside; something is not determined at all
+    poor      a prediction misses by more than 3 times as much as the fit; by more than a pixel and 10 times what the
+              noise of points and readings and the fit's own uncertainty explain; more than a fifth of the views was set
+              aside; something is not determined at all
     usable    more than 1.5 times, more than 3 times, more than a twentieth; something is badly known; fewer than 5
               views were held out; the session was cut off; nobody knows how sure the poses are
     good      none of this
@@ -59,10 +60,10 @@ def _faults(quality: Quality, weaknesses: Sequence[Weakness]) -> tuple[list[str]
     if worse > WORSE * surely:
         sentence = f"they are missed by {worse:.2g} times as much as those of the fit"
         (poor if worse > MUCH_WORSE * surely else doubts).append(sentence)
-    if quality.held_out_rms_px is not None and quality.noise_px is not None:
-        noisier = quality.held_out_rms_px / quality.noise_px
+    if quality.held_out_rms_px is not None and quality.predicted_px is not None:
+        noisier = quality.held_out_rms_px / quality.predicted_px
         if noisier > NOISIER * surely:
-            sentence = f"they are missed by {noisier:.2g} times what single points scatter by"
+            sentence = f"they are missed by {noisier:.2g} times what noise explains"
             much = noisier > MUCH_NOISIER * surely and quality.held_out_rms_px > 1
             (poor if much else doubts).append(sentence)
     fit = [view for view in quality.views if view.use == "fit"]

@@ -18,7 +18,7 @@
     uncertainty          the covariance;  document_covariance  in the document's own numbers
     quantities           what a person asks about;  weakness  what of it the views do not tell
     other_views          what other views would tell;  usual  of a rig whose lens is open
-    held_out             how well each view is predicted by all others
+    held_out             how well each view is predicted by all others;  predicted_miss  how well it should be
 
 A fit starts at `refinement.refine`.
 """

@@ -19,6 +19,7 @@ from calib.likelihood.outliers import (
     softened,
     without_bad_points,
 )
+from calib.likelihood.predicted_miss import predicted_miss
 from calib.likelihood.problem import (
     Estimate,
     Problem,
@@ -68,6 +69,10 @@ class Refined:
             None if values is None else lens_from_vector(values, likes[camera])
             for camera, values in enumerate(self.state.lenses)
         ]
+
+    def predicted_miss(self) -> float | None:
+        """Return by how much points should lie from where they are predicted (rms, px)."""
+        return predicted_miss(self.problem, self.weights, self.descent.evaluation, self.covariance)
 
     def held_out(self) -> list[HeldOut]:
         """Return how well each view is predicted by the fit of all others."""
