@@ -9,6 +9,7 @@ from drivers.cia402.drive import Drive
 from drivers.cia402.link import Network
 from drivers.cia402.options import Cia402AxisOptions
 from drivers.cia402.sampling import Sample
+from drivers.cia402.setup import set_up
 from drivers.cia402.statusword import (
     ACKNOWLEDGED,
     DISABLE_VOLTAGE,
@@ -26,9 +27,9 @@ from drivers.cia402.statusword import (
     TOWARDS_ENABLED,
     State,
 )
-from drivers.cia402.units import Scales, scales
+from drivers.cia402.units import Scales
 from drivers.clock import Clock
-from drivers.errors import DeviceFaultError, DeviceTimeoutError, OptionsError
+from drivers.errors import DeviceFaultError, DeviceTimeoutError
 from drivers.supervised import SupervisedAxis
 
 _RESPONSE: Final = 2.0
@@ -37,9 +38,6 @@ _GRACE: Final = 0.5
 """Seconds after which a bit that should have dropped and stands is taken for a new one."""
 _STILL: Final = 0.1
 """An axis stands while it would take longer than this (s) to leave its tolerance."""
-_INT32: Final = 2**31 - 1
-_COARSE: Final = 0.05
-"""By what part a velocity or acceleration may be off when it is rounded to the drive's units."""
 
 Doing = Literal["nothing", "homing", "positioning", "halting"]
 
@@ -66,23 +64,8 @@ class Cia402Axis(SupervisedAxis):
         Raises DeviceLostError, and OptionsError where drive and profile do not fit each other.
         """
         self._homed, self._fault, self._doing = self._options.absolute, None, "nothing"
-        drive, own = self._drive, self._options
-        drive.connect(network)
-        self._scales = scales(
-            self._spec,
-            drive.units(),
-            own.counts_per_unit,
-            own.velocity_per_unit,
-            own.acceleration_per_unit,
-        )
-        self._check_limits()
-        velocity = self._rate(self._spec.velocity, self._scales.velocity, "velocity")
-        acceleration = self._rate(self._spec.acceleration, self._scales.acceleration, "acceleration")
-        drive.write_and_check(objects.PROFILE_VELOCITY, velocity)
-        drive.write_and_check(objects.PROFILE_ACCELERATION, acceleration)
-        drive.write_and_check(objects.PROFILE_DECELERATION, acceleration)
-        if own.homing_method is not None:
-            drive.write_and_check(objects.HOMING_METHOD, own.homing_method)
+        self._drive.connect(network)
+        self._scales = set_up(self._drive.values, self._spec, self._options)
 
     async def read(self) -> AxisState:
         """Ask the drive; see `drivers.axis.Axis`."""
@@ -302,30 +285,3 @@ class Cia402Axis(SupervisedAxis):
 
     def _is_still(self, sample: Sample) -> bool:
         return abs(sample.velocity) / self._scales.velocity * _STILL <= self._spec.tolerance
-
-    def _rate(self, value: float, scale: float, what: str) -> int:
-        units = round(value * scale)
-        if abs(units - value * scale) > _COARSE * value * scale:
-            raise OptionsError(
-                f"axis '{self._spec.name}': its {what} is {value * scale:.3g} of the drive's units, which are "
-                "too coarse for it: choose finer ones in the drive (objects 0x60A9 and 0x60AA)"
-            )
-        return units
-
-    def _check_limits(self) -> None:
-        spec, scale = self._spec, self._scales.position
-        low, high = sorted(limit * scale for limit in spec.limits)
-        if max(abs(low), abs(high)) > _INT32:
-            raise OptionsError(
-                f"axis '{spec.name}': its limits are more of the drive's units than fit into 32 bits"
-            )
-        lowest, highest = (self._drive.read_if_there(entry) for entry in (objects.LOWEST, objects.HIGHEST))
-        if lowest is None or highest is None or lowest >= highest:
-            return  # the drive has no software limits, or they are switched off
-        if low < lowest - 0.5 or high > highest + 0.5:
-            inside = sorted((lowest / scale, highest / scale))
-            raise OptionsError(
-                f"axis '{spec.name}': the profile's limits {spec.limits[0]:g} to {spec.limits[1]:g} {spec.unit} "
-                f"reach beyond the drive's own (object 0x607D), {inside[0]:g} to {inside[1]:g} {spec.unit}: "
-                "narrow the profile's, or widen the drive's with its own tool"
-            )

@@ -1,7 +1,6 @@
 """The controller of CiA 402 drives: one CAN bus with its nodes."""
 
 import asyncio
-import contextlib
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import ClassVar, Final, Self
@@ -17,8 +16,6 @@ from drivers.clock import Clock
 from drivers.driver import DriverContext
 from drivers.errors import DeviceLostError, OptionsError
 
-_OPERATIONAL: Final = b"\x05"
-_HEARTBEAT: Final = 0x700
 _LOOK: Final = 0.01
 """Seconds between two looks whether the drives have come up."""
 
@@ -39,7 +36,6 @@ class Cia402Controller:
         self._options = options
         self._clock = clock
         self._link = Link(options)
-        self._beating: asyncio.Task[None] | None = None
         self._sampler = Sampler(self._link, clock, options.silence / 4)
         self._drives = {
             name: Drive(name, axis_options[name].node, self._link, self._sampler, clock) for name in specs
@@ -89,7 +85,6 @@ class Cia402Controller:
         await self._link.open()
         try:
             self._sampler.open({drive.node: drive.sample_singly for drive in self._drives.values()})
-            self._beating = asyncio.create_task(self._beat())
             await self._link.ask(self._configure)
             await self._wait_for_heartbeats()
         except BaseException:
@@ -104,26 +99,17 @@ class Cia402Controller:
             await finish(self._let_go())
 
     def _configure(self, network: Network) -> None:
+        network.beat(self._options.own_node, self._options.heartbeat)
         for axis in self._axes.values():
             axis.configure(network)
         # Only when all are there: a drive that was started stops as soon as activecam gives up.
         for drive in self._drives.values():
-            drive.start(self._options.own_node, self._options.heartbeat, self._options.silence)
-
-    async def _beat(self) -> None:
-        """Let the drives know that there is somebody who would stop them."""
-        with contextlib.suppress(DeviceLostError):
-            while True:
-                await self._link.urge(self._send_heartbeat)
-                await self._clock.sleep(self._options.heartbeat)
-
-    def _send_heartbeat(self, network: Network) -> None:
-        network.send_message(_HEARTBEAT + self._options.own_node, _OPERATIONAL)
+            drive.start(self._options.own_node, self._options.heartbeat)
 
     async def _wait_for_heartbeats(self) -> None:
         until = self._clock.now() + self._options.silence
         for drive in self._drives.values():
-            while not drive.operational:
+            while not drive.pulse.beats:
                 if self._clock.now() >= until:
                     raise DeviceLostError(f"{drive.name} does not become operational: check its heartbeat")
                 await self._clock.sleep(_LOOK)
@@ -137,9 +123,5 @@ class Cia402Controller:
         )
 
     async def _let_go(self) -> None:
-        if self._beating is not None:
-            self._beating.cancel()
-            await asyncio.wait([self._beating])
-            self._beating = None
         await self._sampler.close()
         await self._link.close()

@@ -1,8 +1,10 @@
 """The CAN bus: opened, spoken to by one thread, and noticed when it is gone."""
 
 import asyncio
+import contextlib
 import errno
 import logging
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,10 +21,14 @@ Result = TypeVar("Result")
 
 _PATIENCE: Final = 0.1
 """Seconds that a full transmit queue is given to drain."""
+_HEARTBEAT: Final = 0x700
+_OPERATIONAL: Final = b"\x05"
 _BUS_OFF: Final = 0x40
 """Of an error frame's identifier (linux/can/error.h): the controller has left the bus."""
 
 logger = logging.getLogger(__name__)
+# It logs each of its steps; what goes wrong is said, with the drive's name, by this driver's errors.
+logging.getLogger("canopen").setLevel(logging.CRITICAL)
 
 
 class Link:
@@ -35,9 +41,8 @@ class Link:
         self._asking: ThreadPoolExecutor | None = None
         self._stopping: ThreadPoolExecutor | None = None
 
-    @property
-    def network(self) -> "Network":
-        """The open network. Raises DeviceLostError where it is closed or lost."""
+    def require_open(self) -> "Network":
+        """Return the network. Raises DeviceLostError where it is closed or lost."""
         network = self._network
         if network is None:
             raise DeviceLostError(f"{self.name} is not open: open it first")
@@ -73,13 +78,13 @@ class Link:
 
         Raises DeviceLostError where the bus is lost, and what `question` raises.
         """
-        network = self.network
+        network = self.require_open()
         assert self._asking is not None
         return await self._in_thread(self._asking, lambda: question(network))
 
     async def urge(self, send: Callable[["Network"], None]) -> None:
         """Have `send` called at once, past every question. It must not wait for an answer."""
-        network = self.network
+        network = self.require_open()
         assert self._stopping is not None
         await self._in_thread(self._stopping, lambda: send(network))
 
@@ -106,6 +111,8 @@ class Network(canopen.Network):  # type: ignore[misc]
         self.loss: str | None = None
         """Why nothing is received any longer; None while it is."""
         self.listeners.append(_Watch(self))
+        self._beating: threading.Thread | None = None
+        self._closing = threading.Event()
 
     def open(self, arguments: dict[str, Any]) -> None:
         """Take the bus that `can.Bus` makes of `arguments`."""
@@ -113,6 +120,9 @@ class Network(canopen.Network):  # type: ignore[misc]
 
     def close(self) -> None:
         """Let the bus go, whatever state it is in."""
+        self._closing.set()
+        if self._beating is not None:
+            self._beating.join()
         bus: Any = self.bus  # type: ignore[has-type]
         try:
             self.disconnect()
@@ -123,6 +133,16 @@ class Network(canopen.Network):  # type: ignore[misc]
         if port is not None:
             port.close()
         self.bus = None
+
+    def beat(self, node: int, period: float) -> None:
+        """Say every `period` (s) that `node` is there, until `close`, however busy the program is."""
+        self._beating = threading.Thread(target=self._beat, args=(node, period), name="cia402-heartbeat")
+        self._beating.start()
+
+    def _beat(self, node: int, period: float) -> None:
+        with contextlib.suppress(can.CanError, OSError):  # whoever asks next finds out why
+            while not self._closing.wait(period):
+                self.send_message(_HEARTBEAT + node, _OPERATIONAL)
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         """Send a frame; where the transmit queue is full, as soon as there is room."""

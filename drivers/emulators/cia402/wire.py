@@ -1,16 +1,13 @@
 """What an emulated bus's frames travel by: a python-can bus, or a USB adapter that speaks `slcan`."""
 
 import asyncio
-import contextlib
-import os
-import tempfile
-import tty
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, Final
 
 import can
+
+from drivers.emulators.pty_port import PtyPort
 
 Receive = Callable[[int, bytes], None]
 
@@ -91,64 +88,46 @@ class AdapterWire(Wire):
     """A serial CAN adapter: Lawicel's `slcan` on a pseudo-terminal, under a name that stays."""
 
     def __init__(self) -> None:
+        self._port = PtyPort("can-adapter", self._hear, self._reset)
         self._receive: Receive = lambda _id, _data: None
-        self._ends: tuple[int, int] | None = None
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._name = Path()
         self._line = bytearray()
         self._on_the_bus = False
 
     def open(self, receive: Receive) -> Mapping[str, object]:
         """Be plugged in."""
         self._receive = receive
-        self._folder = tempfile.TemporaryDirectory(prefix="activecam-")
-        self._name = Path(self._folder.name) / "can-adapter"
         self.plug()
-        return {"interface": "slcan", "channel": str(self._name), "adapter_delay": "10 ms"}
+        return {"interface": "slcan", "channel": str(self._port.path), "adapter_delay": "10 ms"}
 
     def plug(self) -> None:
-        """Be there, mostly under another device, and always under the same name."""
-        self._line.clear()
-        self._on_the_bus = False
-        device, port = os.openpty()
-        tty.setraw(port)
-        os.set_blocking(device, False)
-        self._ends = device, port
-        asyncio.get_running_loop().add_reader(device, self._read)
-        self._name.symlink_to(os.ttyname(port))
+        """Be there, mostly as another device, and always under the same name."""
+        self._port.plug()
 
     def send(self, can_id: int, data: bytes) -> None:
         """Send a frame up to the computer."""
         if self._on_the_bus:
-            self._write(f"t{can_id:03X}{len(data)}{data.hex().upper()}\r".encode())
+            self._port.send(f"t{can_id:03X}{len(data)}{data.hex().upper()}\r".encode())
 
     def unplug(self) -> None:
         """Be gone from the computer, the name as well."""
-        ends, self._ends = self._ends, None
-        if ends is not None:
-            asyncio.get_running_loop().remove_reader(ends[0])
-            for end in ends:
-                os.close(end)
-            self._name.unlink()
+        self._port.unplug()
 
     def close(self) -> None:
         """Be gone for good."""
-        self.unplug()
-        if self._folder is not None:
-            self._folder.cleanup()
-            self._folder = None
+        self._port.close()
 
-    def _read(self) -> None:
-        assert self._ends is not None
-        with contextlib.suppress(BlockingIOError):
-            self._line += os.read(self._ends[0], 4096)
+    def _reset(self) -> None:
+        self._line.clear()
+        self._on_the_bus = False
+
+    def _hear(self, data: bytes) -> None:
+        self._line += data
         while (end := self._line.find(b"\r")) >= 0:
             line = bytes(self._line[:end])
             del self._line[: end + 1]
-            self._obey(line.decode("ascii", "replace"))
+            self._port.send(self._obey(line.decode("ascii", "replace")))
 
-    def _obey(self, line: str) -> None:
-        answer = b"\r"
+    def _obey(self, line: str) -> bytes:
         match line[:1]:
             case "O" | "L":
                 self._on_the_bus = True
@@ -159,13 +138,7 @@ class AdapterWire(Wire):
             case "t" if self._on_the_bus:
                 length = int(line[4])
                 self._receive(int(line[1:4], 16), bytes.fromhex(line[5 : 5 + 2 * length]))
-                answer = b"z\r"
+                return b"z\r"
             case _:
-                answer = b"\a"
-        self._write(answer)
-
-    def _write(self, data: bytes) -> None:
-        # Nobody reads: an adapter drops what its buffer cannot hold.
-        if self._ends is not None:
-            with contextlib.suppress(BlockingIOError):
-                os.write(self._ends[0], data)
+                return b"\a"
+        return b"\r"
