@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -17,6 +18,8 @@ from calib.targets import CircleGrid
 from drivers.camera import CameraSpec, Image
 from drivers.clock import SystemClock
 from drivers.contract import CameraBench, CameraContract
+from drivers.discovery.cameras import cameras
+from drivers.discovery.machine import Machine
 from drivers.driver import DriverContext
 from drivers.errors import DeviceLostError, OptionsError
 from drivers.simulated.exposure import Exposure
@@ -101,6 +104,17 @@ async def test_what_the_camera_does_not_do_is_told_of(vivid: str) -> None:
         told = " ".join(camera.warnings)
     assert "was asked for MJPG" in told
     assert "frames a second and was asked for 7" in told
+
+
+async def test_the_camera_is_found_with_its_formats(vivid: str) -> None:
+    [camera] = cameras(Machine())
+    assert (camera.node.path, camera.node.driver) == (node(vivid), "vivid")
+    assert vivid in camera.node.names
+    sizes = {form.name: form.sizes for form in camera.formats}
+    assert (SPEC.width, SPEC.height) in sizes["YUYV"]
+    async with opened(v4l2(vivid)):
+        [camera] = cameras(Machine())
+        assert os.getpid() in [holder.pid for holder in camera.node.holders]
 
 
 async def test_a_node_without_pictures_is_told_of(vivid: str) -> None:
