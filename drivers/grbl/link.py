@@ -9,7 +9,7 @@ import contextlib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeVar
 
 from drivers.cancellation import finish
 from drivers.clock import Clock
@@ -26,8 +26,10 @@ _RETRY: Final = 1.0
 """Seconds between two resets of a controller that does not say who it is; a boot loader hears none."""
 _OWN_BANNER: Final = 0.5
 """Seconds in which a controller restarts of itself after an alarm, if it does."""
+_SLICES: Final = 20
 _LONGEST: Final = 1024
 """Bytes without an end of line after which they are noise."""
+Answer = TypeVar("Answer")
 _BANNER = re.compile(r"Grbl(HAL)? \d", re.ASCII | re.IGNORECASE)
 
 
@@ -170,8 +172,7 @@ class Link:
             request = self._request = _Request(line, asyncio.get_running_loop().create_future())
             try:
                 self._write(f"{line}\n".encode())
-                async with asyncio.timeout(patience):
-                    await request.answered
+                await _within(patience, request.answered)
             except TimeoutError:
                 self._lose(self._silent(patience))
                 self._require_open()
@@ -199,8 +200,7 @@ class Link:
         self._asked_at = self._clock.now()
         try:
             self._write(b"?")
-            async with asyncio.timeout(self._options.answer_timeout):
-                return await self._report, self._asked_at
+            return await _within(self._options.answer_timeout, self._report), self._asked_at
         except TimeoutError:
             self._lose(self._silent(self._options.answer_timeout))
             raise self._gone() from None
@@ -333,6 +333,21 @@ class Link:
 
     def _gone(self) -> DeviceLostError:
         return DeviceLostError(self._lost)
+
+
+async def _within(patience: float, answer: "asyncio.Future[Answer]") -> Answer:
+    """Return an answer that comes within `patience` seconds. Raises TimeoutError.
+
+    They pass in slices, so that a time in which this program itself was held up is not laid to the controller.
+    """
+    for _ in range(_SLICES):
+        done, _ = await asyncio.wait([answer], timeout=patience / _SLICES)
+        if done:
+            break
+    else:
+        answer.cancel()
+        raise TimeoutError
+    return answer.result()
 
 
 def _retrieve(task: "asyncio.Task[tuple[Report, float]]") -> None:

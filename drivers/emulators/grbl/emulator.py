@@ -119,7 +119,8 @@ class GrblEmulator:
     async def start(self) -> Mapping[str, object]:
         """Be plugged in, powered."""
         self.replug()
-        return {"port": str(self.port.path)}
+        # A machine that renders pictures on the side lets an answer wait as no microcontroller does.
+        return {"port": str(self.port.path), "answer_timeout": "5 s"}
 
     async def close(self) -> None:
         """Be gone."""
