@@ -1,4 +1,4 @@
-"""The line protocol: a line and its ok, `?` and its report, resets and alarms at any time.
+"""The dialogue: a line and its ok, `?` and its report, resets and alarms at any time.
 
 Lines are sent one at a time, each after the answer to the one before: the controller's buffer of 128 bytes
 overflows without a word. Real-time bytes go past all of them.
@@ -6,6 +6,7 @@ overflows without a word. Real-time bytes go past all of them.
 
 import asyncio
 import contextlib
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,24 +14,22 @@ from typing import Final, TypeVar
 
 from drivers.cancellation import finish
 from drivers.clock import Clock
-from drivers.errors import DeviceLostError, DriverError, MotionStoppedError
+from drivers.errors import DeviceLostError, MotionStoppedError
 from drivers.grbl import words
 from drivers.grbl.options import GrblOptions
-from drivers.grbl.port import SerialPort
 from drivers.grbl.status import Report, ReportReader
+from drivers.grbl.wire import Wire
 
 RESET: Final = b"\x18"
-JOG_CANCEL: Final = b"\x85"
 FEED_HOLD: Final = b"!"
 _RETRY: Final = 1.0
 """Seconds between two resets of a controller that does not say who it is; a boot loader hears none."""
 _OWN_BANNER: Final = 0.5
 """Seconds in which a controller restarts of itself after an alarm, if it does."""
 _SLICES: Final = 20
-_LONGEST: Final = 1024
-"""Bytes without an end of line after which they are noise."""
-Answer = TypeVar("Answer")
 _BANNER = re.compile(r"Grbl(HAL)? \d", re.ASCII | re.IGNORECASE)
+
+Answer = TypeVar("Answer")
 
 
 class RefusedError(Exception):
@@ -67,19 +66,12 @@ class Link:
     ) -> None:
         self.halts = 0
         """How often something was told to stop."""
-        self.farewell = JOG_CANCEL
-        """What is sent when the link is given up, in case that the controller still listens."""
         self._options = options
         self._clock = clock
         self._alarmed = alarmed
         self._restarted = restarted
+        self._wire = Wire(options, self._take, self._end)
         self._reader = ReportReader()
-        self._port: SerialPort | None = None
-        self._lost = f"the controller at {options.port} is not open: open it first"
-        self._release: asyncio.Task[None] | None = None
-        """Closes a port that was lost."""
-        self._unread = bytearray()
-        self._heard_any = False
         self._opening = False
         self._ready = asyncio.Event()
         """Cleared from a reset or an alarm until the controller has said who it is."""
@@ -89,27 +81,22 @@ class Link:
         self._asking = asyncio.Lock()
         self._next_report: asyncio.Task[tuple[Report, float]] | None = None
         self._report: asyncio.Future[Report] | None = None
-        self._asked_at = -float("inf")
+        self._asked_at = -math.inf
 
     async def open(self) -> None:
         """Open the port, restart the controller and hear who it is. Raises DeviceLostError."""
-        await self.close()
-        port = SerialPort(self._options.port, self._options.baud_rate, self._hear, self._lose)
-        await port.open()
-        self._port, self._opening, self._heard_any = port, True, False
-        self._unread.clear()
+        await self._wire.open()
+        self._opening = True
         self._ready.clear()
         try:
             async with asyncio.timeout(self._options.start_timeout):
                 while not self._ready.is_set():
-                    self._write(RESET)
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(_RETRY):
-                            await self._ready.wait()
+                    self._wire.write(RESET)
+                    await self._is_ready_within(_RETRY)
         except TimeoutError:
-            self._lose(
+            self._wire.lose(
                 f"what is at {self._options.port} does not speak as Grbl does: check the port and 'baud_rate'"
-                if self._heard_any
+                if self._wire.anything_heard
                 else f"nothing at {self._options.port} says that it is Grbl: check the controller's power"
             )
         except BaseException:
@@ -117,14 +104,11 @@ class Link:
             raise
         finally:
             self._opening = False
-        self._require_open()
+        self._wire.require_open()
 
     async def close(self) -> None:
         """Let the port go."""
-        if self._port is not None:
-            self._lose(f"the controller at {self._options.port} is not open: open it first")
-        if self._release is not None:
-            await asyncio.wait([self._release])
+        await self._wire.close()
 
     async def ask(self, line: str, patience: float | None = None, halts: int | None = None) -> list[str]:
         """Send a line and return what the controller said before its ok, for which it has `patience` seconds.
@@ -150,14 +134,18 @@ class Link:
         if byte == RESET:
             self.reset()
         else:
-            self._write(byte)
+            self._wire.write(byte)
 
     def reset(self) -> None:
         """Restart the controller; whatever it says before its banner is of the past."""
-        self._write(RESET)
-        self._interrupt()
+        self._wire.write(RESET)
+        self._fail(RestartedError("the controller has restarted"))
         self._ready.clear()
-        self._revive(self._options.answer_timeout, "does not come back from a reset")
+        self._revive(own=False)
+
+    def give_up_by(self, byte: bytes) -> None:
+        """Send this byte if the controller is lost: what stops what it does."""
+        self._wire.farewell = byte
 
     async def settled(self) -> None:
         """Return when the line under way, if any, is answered."""
@@ -171,11 +159,10 @@ class Link:
                 raise MotionStoppedError(f"'{line}' was not sent, because of a stop")
             request = self._request = _Request(line, asyncio.get_running_loop().create_future())
             try:
-                self._write(f"{line}\n".encode())
+                self._wire.write(f"{line}\n".encode())
                 await _within(patience, request.answered)
             except TimeoutError:
-                self._lose(self._silent(patience))
-                self._require_open()
+                self._is_silent(patience)
             finally:
                 self._request = None
             return request.lines
@@ -199,35 +186,18 @@ class Link:
         self._report = asyncio.get_running_loop().create_future()
         self._asked_at = self._clock.now()
         try:
-            self._write(b"?")
+            self._wire.write(b"?")
             return await _within(self._options.answer_timeout, self._report), self._asked_at
         except TimeoutError:
-            self._lose(self._silent(self._options.answer_timeout))
-            raise self._gone() from None
+            self._is_silent(self._options.answer_timeout)
+            raise
         finally:
             self._report = None
 
     async def _wait_until_ready(self) -> None:
-        self._require_open()
+        self._wire.require_open()
         await self._ready.wait()
-        self._require_open()
-
-    def _write(self, data: bytes) -> None:
-        self._require_open()
-        assert self._port is not None
-        try:
-            self._port.write(data)
-        except DeviceLostError as error:
-            self._lose(str(error))
-            raise
-
-    def _hear(self, data: bytes) -> None:
-        self._heard_any = True
-        self._unread.extend(data)
-        *lines, rest = self._unread.split(b"\n")
-        self._unread[:] = rest if len(rest) < _LONGEST else b""
-        for line in lines:
-            self._take(line.decode("ascii", "replace").strip())
+        self._wire.require_open()
 
     def _take(self, line: str) -> None:
         if _BANNER.match(line):
@@ -256,7 +226,7 @@ class Link:
     def _take_banner(self) -> None:
         asked = not self._ready.is_set()
         self._reader.forget()
-        self._interrupt()
+        self._fail(RestartedError("the controller has restarted"))
         self._ready.set()
         if not asked:
             self._restarted()
@@ -264,75 +234,57 @@ class Link:
     def _take_alarm(self, number: str) -> None:
         alarm = int(number) if re.fullmatch(r"\d{1,3}", number, re.ASCII) else None
         self._alarmed(alarm)
-        self._interrupt()
+        self._fail(RestartedError("the controller is in alarm"))
         self._ready.clear()
-        if alarm in {1, 2}:
-            self._quietly_write(RESET)  # it is deaf to everything else
-            self._revive(self._options.answer_timeout, "does not come back from an alarm")
-        else:
-            self._revive(_OWN_BANNER, None)
+        deaf = alarm in {1, 2}
+        if deaf:
+            self._wire.try_to_write(RESET)
+        self._revive(own=not deaf)
 
-    def _revive(self, patience: float, otherwise: str | None) -> None:
-        """Wait for the banner; reset the controller where it does not come, and lose it after a reset."""
+    def _revive(self, *, own: bool) -> None:
+        """Wait for the banner after a reset; with `own` the controller may restart of itself, or else is reset.
+
+        It is lost where no banner comes after a reset.
+        """
 
         async def wait() -> None:
-            for again in (otherwise is None, False):
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(patience):
-                        await self._ready.wait()
-                        return
-                if not again:
-                    break
-                self._quietly_write(RESET)
-            self._lose(
-                f"the controller at {self._options.port} {otherwise or 'does not come back from an alarm'}: "
-                "switch it off and on"
-            )
+            if own and not await self._is_ready_within(_OWN_BANNER):
+                self._wire.try_to_write(RESET)
+            if not await self._is_ready_within(self._options.answer_timeout):
+                self._wire.lose(
+                    f"the controller at {self._options.port} does not come back from a reset: switch it off and on"
+                )
 
         if self._revival is not None:
             self._revival.cancel()
         self._revival = asyncio.ensure_future(wait())
 
-    def _interrupt(self) -> None:
-        """End whatever waits for an answer that will not come."""
-        self._fail(RestartedError("the controller has restarted"))
+    async def _is_ready_within(self, seconds: float) -> bool:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._ready.wait()
+        return self._ready.is_set()
 
     def _fail(self, error: Exception) -> None:
+        """End what waits for an answer that will not come."""
         if self._report is not None and not self._report.done():
             self._report.set_exception(error)
         if self._request is not None and not self._request.answered.done():
             self._request.answered.set_exception(error)
 
-    def _lose(self, reason: str) -> None:
-        """Believe nothing any more."""
-        port, self._port = self._port, None
-        if port is None:
-            return
-        self._lost = reason
-        with contextlib.suppress(DriverError):
-            port.write(self.farewell)
+    def _end(self, error: DeviceLostError) -> None:
         if self._revival is not None:
             self._revival.cancel()
-        self._fail(self._gone())
-        self._ready.set()  # whoever waits for it finds that the link is gone
-        self._release = asyncio.ensure_future(port.close())
+        self._fail(error)
+        self._ready.set()  # whoever waits for it finds that the wire is gone
 
-    def _quietly_write(self, data: bytes) -> None:
-        with contextlib.suppress(DriverError):
-            self._write(data)
-
-    def _silent(self, seconds: float) -> str:
-        return (
+    def _is_silent(self, seconds: float) -> None:
+        """Lose the controller, and raise DeviceLostError."""
+        self._wire.lose(
             f"the controller at {self._options.port} has not answered for {seconds:g} s: "
             "check its power and its cable"
         )
-
-    def _require_open(self) -> None:
-        if self._port is None:
-            raise self._gone()
-
-    def _gone(self) -> DeviceLostError:
-        return DeviceLostError(self._lost)
+        self._wire.require_open()
 
 
 async def _within(patience: float, answer: "asyncio.Future[Answer]") -> Answer:

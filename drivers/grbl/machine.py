@@ -10,10 +10,11 @@ from drivers.axis import AxisSpec
 from drivers.clock import Clock
 from drivers.errors import DeviceFaultError, DeviceLostError, DriverError, LimitError
 from drivers.grbl import words
-from drivers.grbl.link import FEED_HOLD, JOG_CANCEL, RESET, Link, RefusedError, RestartedError
+from drivers.grbl.link import FEED_HOLD, RESET, Link, RefusedError, RestartedError
 from drivers.grbl.options import LETTERS, GrblAxisOptions, GrblOptions
 from drivers.grbl.settings import differences, parse_settings, remarks
 from drivers.grbl.status import Report
+from drivers.grbl.wire import JOG_CANCEL
 
 logger = logging.getLogger(__name__)
 
@@ -130,7 +131,7 @@ class Machine:
         self._begin(name, everything=not self._one_by_one)
         self.homed.difference_update(names)
         command = f"$H{self._axis_options[name].letter}" if self._one_by_one else "$H"
-        self._link.farewell = RESET
+        self._link.give_up_by(RESET)
         self.homing = asyncio.ensure_future(self._home(name, command, names))
         self.homing.add_done_callback(_retrieve)
 
@@ -209,7 +210,7 @@ class Machine:
             if not self._resetting:
                 raise
         finally:
-            self._link.farewell = JOG_CANCEL
+            self._link.give_up_by(JOG_CANCEL)
 
     async def _ask(self, name: str, line: str, halts: int, patience: float | None = None) -> None:
         try:

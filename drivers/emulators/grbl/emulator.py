@@ -169,9 +169,7 @@ class GrblEmulator:
     def unplug(self) -> None:
         """Pull the cable."""
         self._cancel_boot()
-        for handle in self._late:
-            handle.cancel()
-        self._late.clear()
+        self._forget_late()
         self.port.unplug()
         self.firmware.power_down()
 
@@ -184,6 +182,7 @@ class GrblEmulator:
         """Undo what is wrong with the line and the motors."""
         self._mute = self._garbled = self._dropping = False
         self._delay = 0.0
+        self._forget_late()
         for motor in self.motors.values():
             motor.stalled = False
 
@@ -216,6 +215,11 @@ class GrblEmulator:
             self._later(lambda: self.port.send(data))
         else:
             self.port.send(data)
+
+    def _forget_late(self) -> None:
+        for handle in self._late:
+            handle.cancel()
+        self._late.clear()
 
     def _later(self, act: Callable[[], None]) -> None:
         def due() -> None:
