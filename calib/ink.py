@@ -17,6 +17,8 @@ from calib.targets import (
     CircleGrid,
     NoTarget,
     Target,
+    marker_cells,
+    marker_dictionary,
     target_points,
 )
 
@@ -108,8 +110,7 @@ def _boxes(corners: NDArray[np.float64], side: float) -> NDArray[np.float64]:
 
 def _markers(dictionary: str, corners: NDArray[np.float64], side: float) -> NDArray[np.float64]:
     """Draw markers 0, 1, ... with their top left corners (n, 2): a rectangle (m, 4) for each run of black cells."""
-    markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
-    cells = markers.markerSize + 2  # a border of one black cell
+    markers, cells = marker_dictionary(dictionary), marker_cells(dictionary)
     cell = side / cells
     drawn = []
     for number, corner in enumerate(corners):

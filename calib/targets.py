@@ -265,9 +265,14 @@ def _require_smaller(name: str, value: float, limit_name: str, limit: float) -> 
         raise ValueError(f"{name} ({value:g} m) must be smaller than {limit_name} ({limit:g} m)")
 
 
+def marker_dictionary(name: str) -> cv2.aruco.Dictionary:
+    """Return OpenCV's dictionary of markers with this name."""
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
 def marker_cells(dictionary: str) -> int:
     """Return how many cells a side of a dictionary's markers has, the black border's included."""
-    return int(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)).markerSize) + 2
+    return marker_dictionary(dictionary).markerSize + 2
 
 
 def _dictionary_size(name: str) -> int:
@@ -277,7 +282,7 @@ def _dictionary_size(name: str) -> int:
         raise ValueError(
             f"{name!r} is not a marker dictionary of OpenCV, as DICT_5X5_100 and DICT_APRILTAG_36h11 are"
         )
-    return int(cv2.aruco.getPredefinedDictionary(number).bytesList.shape[0])
+    return len(marker_dictionary(name).bytesList)
 
 
 def _require_markers(needed: int, dictionary: str) -> None:

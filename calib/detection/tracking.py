@@ -17,7 +17,7 @@ from calib.detection.marks import Marks, marks_of
 from calib.detection.picture import Picture, grey_values, noise_of
 from calib.detection.plane import BentView, bent_view, view_of_plane
 from calib.detection.sparse_disks import SparseDisks, sparse_centroids
-from calib.detection.tag_edges import refine_tag
+from calib.detection.tag_corners import measure_tags
 from calib.errors import DetectionError
 from calib.targets import (
     AprilGrid,
@@ -303,30 +303,18 @@ def _measured(
         contrasts = looks.contrasts[chosen]
         good = found.good & (found.left < np.maximum(LEFT_OF_NOISE * window.noise, LEFT * contrasts))
         return _Measured(ids[good], found.pixels[good], found.covariances[good])
-    across = np.linalg.norm(places.ahead - places.edges, axis=-1).min(axis=1)[chosen]
     picture = Picture(np.empty((0, 0), np.uint8), window.values.astype(np.float32), window.noise)
     if isinstance(target, AprilGrid):
-        return _tags(picture, marks, places, chosen, np.clip(across / 2, 1.5, 8.0))
+        tags = measure_tags(picture, target, chosen, places.points[chosen])
+        ids, pixels, covariances = marks.points[chosen][tags.found], tags.pixels, tags.covariances
+        return _Measured(
+            ids.ravel(), pixels[tags.found].reshape(-1, 2), covariances[tags.found].reshape(-1, 2, 2)
+        )
     points, rough = target_points(target)[ids, :2], places.points[chosen].reshape(-1, 2)
     view = view_of_plane(points, rough)
     if view is None:
         return _Measured(ids[:0], np.empty((0, 2)), np.empty((0, 2, 2)))
     return _Measured(ids, *measure_corners(picture, view, points, rough, marks.spacing, marks.clear))
-
-
-def _tags(
-    picture: Picture, marks: Marks, places: _Places, chosen: NDArray[np.int64], reaches: Array
-) -> _Measured:
-    found = [
-        (marks.points[tag], refined)
-        for tag, reach in zip(chosen, reaches, strict=True)
-        if (refined := refine_tag(picture, places.points[tag], float(reach))) is not None
-    ]
-    return _Measured(
-        np.array([ids for ids, _ in found], dtype=np.int64).ravel(),
-        np.array([tag.pixels for _, tag in found]).reshape(-1, 2),
-        np.array([tag.covariances for _, tag in found]).reshape(-1, 2, 2),
-    )
 
 
 def _in_place(target: Target, marks: Marks, measured: _Measured) -> NDArray[np.int64]:

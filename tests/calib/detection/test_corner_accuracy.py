@@ -3,15 +3,20 @@
 import cv2
 import numpy as np
 import pytest
-from drawn_targets import Drawn, draw
+from drawn_targets import INK, Drawn, draw, project
+from scipy.ndimage import map_coordinates
 
 from calib.detection import Detection, detect
+from calib.detection.picture import read_picture
 from calib.detection.plane import PlaneView, bent_view
-from calib.targets import Charuco, Chessboard
+from calib.detection.tag_corners import measure_tags
+from calib.targets import AprilGrid, Charuco, Chessboard
 
 CHESSBOARD = Chessboard(rows=6, columns=9, pitch=0.025)
 CHARUCO = Charuco(rows=5, columns=7, pitch=0.03, marker=0.021, dictionary="DICT_5X5_100")
-KINDS = [pytest.param(target, id=target.kind) for target in (CHESSBOARD, CHARUCO)]
+APRILGRID = AprilGrid(rows=4, columns=5, tag=0.03, spacing=0.009)
+LARGE_TAGS = AprilGrid(rows=2, columns=3, tag=0.06, spacing=0.018)
+KINDS = [pytest.param(target, id=target.kind) for target in (CHESSBOARD, CHARUCO, APRILGRID)]
 TILTED = (36, 27)  # by 45 degrees altogether
 
 
@@ -57,24 +62,78 @@ def test_what_the_camera_clips_pulls_no_corner(target):
     assert np.sqrt(np.square(off).mean()) < 0.02
 
 
-@pytest.mark.parametrize("target", KINDS)
-def test_a_lens_that_bends_the_edges_moves_no_corner(target):
+def through_a_barrel(target: AprilGrid | Charuco | Chessboard, bend: float) -> tuple[Drawn, np.ndarray]:
+    """Bend a drawing, so that the place at radius r, in half heights, shows that of r (1 + bend r²): it, the points."""
     straight = draw(target, size=(1280, 960), roll=7, blur=0.7)
-    bend = 0.05  # a barrel: the picture's place at radius r, in half heights, is that of r (1 + bend r²)
     half, middle = 480, np.array([639.5, 479.5])
     y, x = np.mgrid[:960, :1280]
-    places = (np.stack([x, y], axis=-1) - middle) / half
-    source = middle + half * places * (1 + bend * np.square(places).sum(axis=-1, keepdims=True))
-    picture = cv2.remap(straight.picture, *np.moveaxis(source, -1, 0).astype(np.float32), cv2.INTER_CUBIC)
-
+    places = (np.stack([y, x], axis=-1) - middle[::-1]) / half
+    source = middle[::-1] + half * places * (1 + bend * np.square(places).sum(axis=-1, keepdims=True))
+    # OpenCV's remap would round the places to a 32nd of a pixel.
+    picture = map_coordinates(straight.picture.astype(float), np.moveaxis(source, -1, 0), mode="nearest")
     wanted = (straight.points - middle) / half
     bent = wanted.copy()
-    for _ in range(50):
-        bent = wanted / (1 + bend * np.square(bent).sum(axis=1, keepdims=True))
-    detection = detect(picture, target)
-    off = detection.pixels - (middle + half * bent)[detection.ids]
-    assert np.abs(straight.points - (middle + half * bent)).max() > 8
-    assert np.sqrt(np.square(off).mean()) < 0.02
+    for _ in range(100):
+        bent = (bent + wanted / (1 + bend * np.square(bent).sum(axis=1, keepdims=True))) / 2
+    grey = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+    return Drawn(grey, straight.picture_from_world, middle + half * bent), straight.points
+
+
+@pytest.mark.parametrize(
+    ("target", "bend"),
+    [
+        (CHESSBOARD, 0.05),
+        (CHARUCO, 0.05),
+        (APRILGRID, 0.05),
+        pytest.param(APRILGRID, 0.12, id="strongly, aprilgrid"),
+        pytest.param(LARGE_TAGS, 0.12, id="strongly, large tags"),
+    ],
+)
+def test_a_lens_that_bends_the_edges_moves_no_corner(target, bend):
+    drawn, straight = through_a_barrel(target, bend)
+    detection = detect(drawn.picture, target)
+    assert np.abs(straight - drawn.points).max() > 8
+    assert len(detection.ids) == len(straight)
+    assert np.sqrt(np.square(errors(drawn, detection)).mean()) < 0.02
+
+
+def test_squares_that_touch_the_corners_of_tags_move_none():
+    drawn = draw(APRILGRID, tilt=(20, 15), roll=7, blur=0.8)
+    between = [
+        np.array([[0.03, 0.03], [0.039, 0.03], [0.039, 0.039], [0.03, 0.039]])
+        + 0.039 * np.array([column, row])
+        for row in range(3)
+        for column in range(4)
+    ]
+    fine = cv2.resize(drawn.picture, None, fx=8, fy=8, interpolation=cv2.INTER_CUBIC)
+    shape = np.zeros(fine.shape, np.uint8)
+    for corners in between:
+        pixels = (project(drawn.picture_from_world, corners) + 0.5) * 8 - 0.5
+        cv2.fillConvexPoly(shape, np.rint(pixels).astype(np.int32), 1)
+    ink = cv2.GaussianBlur(shape.astype(np.float32), (0, 0), 8 * 0.8)
+    ink = cv2.resize(ink, drawn.picture.shape[::-1], interpolation=cv2.INTER_AREA)
+    picture = np.rint(drawn.picture * (1 - ink) + INK * ink).astype(np.uint8)
+    detection = detect(picture, APRILGRID)
+    assert len(detection.ids) == len(drawn.points)
+    assert np.sqrt(np.square(errors(drawn, detection)).mean()) < 0.02
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0])
+def test_tags_are_measured_where_they_are_expected(off):
+    drawn = draw(APRILGRID, tilt=(20, 15), roll=7, noise=1)
+    picture = read_picture(drawn.picture)
+    tags = np.array([3, 7, 18])
+    true = drawn.points.reshape(-1, 4, 2)[tags]
+    measured = measure_tags(picture, APRILGRID, tags, true + off * np.array([[0.6, 0.8], [-0.8, 0.6]] * 2))
+    assert measured.found.all()
+    assert np.abs(measured.pixels - true).max() < 0.05
+
+
+def test_what_is_no_tag_is_not_measured_as_one():
+    drawn = draw(CHESSBOARD, noise=1)
+    expected = draw(APRILGRID).points.reshape(-1, 4, 2)
+    measured = measure_tags(read_picture(drawn.picture), APRILGRID, np.arange(20), expected)
+    assert not measured.found.any()
 
 
 def test_a_bent_view_follows_the_points_and_what_is_between_them():
