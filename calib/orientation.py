@@ -93,7 +93,7 @@ def oriented(
     undecided = np.flatnonzero(telling)[differing[members]]
     poses = carried.copy()
     poses[telling] = turns[np.array(kept.chosen)[members]] @ carried[telling]
-    checked = _checked(replace(views, poses=poses), symmetries, turnable, solve, kept.solved)
+    checked = _checked(replace(views, poses=poses), symmetries, turnable, solve, kept.solved, telling)
     return Oriented(*checked, undecided)
 
 
@@ -161,7 +161,12 @@ def _trials(
         done[chosen] = _Trial(chosen, solved, _miss(solved, turned))
     if not done:
         assert failure is not None
-        raise failure
+        if fixed.all():
+            raise failure
+        raise UnsolvableError(
+            f"{failure}; the target looks the same after every turn by {360 / len(turns):g} degrees, so that views "
+            f"less than {180 / len(turns):g} degrees apart are best"
+        ) from failure
     return list(done.values())
 
 
@@ -202,16 +207,21 @@ def _checked(
     turnable: Mask,
     solve: Callable[[PoseViews], Solved],
     solved: Solved,
+    telling: Mask,
 ) -> tuple[Array, Solved]:
-    """Return the poses (n, 4, 4) read the way round that the chain solved from them agrees with, and it."""
+    """Return the poses (n, 4, 4) read the way round that the chain solved from them agrees with, and it.
+
+    It was `solved` from those `telling` (n,).
+    """
+    of_all = bool(telling.all())
     for _ in range(CHECKS):
         ways = _ways_round(views.poses, symmetries)
         nearest = np.argmin(_angles(predicted_poses(solved, views), ways), axis=0)
         chosen = np.where(turnable, nearest, 0)
-        views = replace(views, poses=ways[chosen, np.arange(len(chosen))])
-        solved = solve(views)
-        if not chosen.any():
+        if of_all and not chosen.any():
             break
+        views = replace(views, poses=ways[chosen, np.arange(len(chosen))])
+        solved, of_all = solve(views), True
     return views.poses, solved
 
 

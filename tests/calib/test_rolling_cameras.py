@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from benchmarks.true_rig import Rig, unit
 from calib import Calibration, solve
 from calib.detection.labelling import upright
+from calib.errors import UnsolvableError
 from calib.session import SESSION_FORMAT, Session
 from calib.targets import Target, target_points, target_symmetries
 from calib.transforms import pose_error
@@ -143,6 +144,14 @@ def test_steps_of_more_than_a_quarter_turn(step: int) -> None:
     """The smaller turn of the camera is not the true one, and only one chain explains all of them."""
     rigs = {"main": rolling_rig(DISKS)}
     assert_true(session(rigs, DISKS, slide() + rolls(0, 3 * step, 4)), rigs)
+
+
+def test_many_such_steps_are_refused_in_words() -> None:
+    rigs = {"main": rolling_rig(SQUARE)}
+    with pytest.raises(
+        UnsolvableError, match="same after every turn by 90 degrees, so that views less than 45"
+    ):
+        solve(session(rigs, SQUARE, slide() + rolls(0, 400, 6)), "closed_form")
 
 
 @pytest.mark.parametrize("target", [DISKS, SQUARE, SQUARE_BOARD])

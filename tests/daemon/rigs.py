@@ -62,8 +62,8 @@ positions = {positions}
 
 [[procedure.sweeps]]
 joint = "pan"
-from = "-{reach} deg"
-to = "{reach} deg"
+from = "-{reach:g} deg"
+to = "{reach:g} deg"
 positions = {positions}
 start = {{ slide = "50 mm" }}
 

@@ -349,6 +349,20 @@ class TestATargetHardToSee:
         assert session.views[3].readings[0] == pytest.approx(100 / 3, abs=0.05)
         assert [view.joint for view in session.views[:5]] == ["slide"] * 4 + ["pan"]
 
+    async def test_only_so_many_frames_are_kept_to_be_looked_at_again(
+        self, tmp_path: Path, blind: Callable[[set[int]], None], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        blind({2, 3, 4, 5})
+        monkeypatch.setattr("daemon.procedure.survey.MOST_KEPT", 1)
+        profile = small_rig(tmp_path, positions=6)
+        async with running_service(profile, tmp_path / "data") as service:
+            _, events = await finish(service, await service.runs.start())
+        left_out, measured = of(events, "warning")
+        assert left_out.message.startswith("position 2 of 14 is left out: ")
+        assert measured.message.startswith("position 3 of 14 is measured all the same: ")
+        # The one that is given up is told of at once.
+        assert left_out.sequence < of(events, "moving")[3].sequence < measured.sequence
+
     async def test_a_target_that_is_partly_out_of_the_picture_counts_with_the_points_that_are_in_it(
         self, tmp_path: Path
     ) -> None:
