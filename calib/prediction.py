@@ -113,11 +113,14 @@ def _seen_from(
     if session.nominal is None:
         seen, kept, readings = part_about(seen, readings)
     renumbered = [replace(observations[place], view=number) for number, place in enumerate(kept)]
-    views = camera_views(seen, renumbered)
-    if session.nominal is None:
-        solution = first_solution(seen, renumbered, views)
-    else:
-        solution = nominal_solution(seen, session.nominal, renumbered, views)
+    try:
+        views = camera_views(seen, renumbered)
+        if session.nominal is None:
+            solution = first_solution(seen, renumbered, views)
+        else:
+            solution = nominal_solution(seen, session.nominal, renumbered, views)
+    except np.linalg.LinAlgError as error:
+        raise UnsolvableError("the views so far do not determine lens and chain") from error
     lens = solution.lenses[camera]
     if lens is None or solution.mounts is None:
         raise UnsolvableError(f"the lens of camera '{session.cameras[camera].name}' is not known")

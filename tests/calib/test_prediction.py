@@ -147,6 +147,16 @@ def test_a_target_out_of_the_picture_is_not_predicted_in_it() -> None:
         predicted_by_calibration(bent, session, session.views[0].model_copy(update={"readings": away}))
 
 
+def test_views_that_determine_nothing_are_no_error_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError
+
+    planned = Planned("paper-table")
+    monkeypatch.setattr("calib.prediction.camera_views", singular)
+    with pytest.raises(UnsolvableError, match="do not determine lens and chain"):
+        predicted_by_views(planned.session, planned.observations, planned.session.views[3].readings)
+
+
 def test_views_that_contradict_each_other_predict_nothing() -> None:
     """The nearest view's readings are wrong by a lot: what is predicted might be, too."""
     planned = Planned("paper-table")

@@ -15,6 +15,8 @@ from benchmarks.true_rig import Rig, unit
 from calib import Calibration, solve
 from calib.detection.labelling import upright
 from calib.errors import UnsolvableError
+from calib.observations import observe
+from calib.prediction import predicted_by_views
 from calib.session import SESSION_FORMAT, Session
 from calib.targets import Target, target_points, target_symmetries
 from calib.transforms import pose_error
@@ -216,8 +218,8 @@ def test_a_second_camera_that_may_see_it_either_way_round_is_named() -> None:
     assert "in views 11, 12, 13, 14, 15, 16, 17, 18 and 3 more cannot be told" in doubt
 
 
-def test_a_drawing_decides_without_sweeps() -> None:
-    """Views all round, none of a joint alone, with the drawing of the rig: a tilt that carries the roll."""
+def drawn() -> tuple[Session, Rig]:
+    """Return views all round, none of a joint alone, with the drawing of the rig: a tilt that carries the roll."""
     rolling, middle = rolling_rig(DISKS), target_points(parsed(DISKS)).mean(axis=0)
     axes = np.array([unit([1.0, 0.3, 0.0]), rolling.axes[1]])
     scales = np.array([0.0175, 0.0175])
@@ -231,12 +233,31 @@ def test_a_drawing_decides_without_sweeps() -> None:
         "std": {"length": 0.001, "angle": 0.001, "scale": 0.001},
     }
     taken = session({"main": rig}, DISKS, views, names=["tilt", "roll"])
-    drawn = Session.model_validate(taken.model_dump(mode="json", exclude_unset=True) | {"nominal": nominal})
-    calibration = solve(drawn)
+    document = taken.model_dump(mode="json", exclude_unset=True) | {"nominal": nominal}
+    return Session.model_validate(document), rig
+
+
+def test_a_drawing_decides_without_sweeps() -> None:
+    session, _ = drawn()
+    calibration, readings = solve(session), session.readings()
     assert doubts(calibration) == []
     assert calibration.quality.rms_px is not None
     assert calibration.quality.rms_px < 0.01
     # The world stays the way round that was chosen once, whichever view comes first.
-    later = drawn.model_copy(update={"origin": calibration.origin}).with_views(drawn.views[5:])
+    later = session.model_copy(update={"origin": calibration.origin}).with_views(session.views[5:])
     again = solve(later).world_from_camera(readings)
     assert np.allclose(again, calibration.world_from_camera(readings), atol=1e-3)
+
+
+def test_a_drawing_predicts_without_sweeps() -> None:
+    session, rig = drawn()
+    points, observations = target_points(session.target), observe(session).observations
+    for view in (0, 6, 13):
+        readings = session.views[view].readings
+        others = [observation for observation in observations if observation.view != view]
+        predicted = predicted_by_views(session, others, readings)
+        seen = project(points, rig.pose(readings))[predicted.ids]
+        turned = seen[::-1]  # all points are in the picture, and a half turn reverses their order
+        away = [np.linalg.norm(way - predicted.pixels, axis=1).max() for way in (seen, turned)]
+        assert len(predicted.ids) == len(points)
+        assert min(away) < 0.1
