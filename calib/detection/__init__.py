@@ -8,7 +8,7 @@ aprilgrid    corners of tags;  tag_corners: where sides cross, on the grey value
              tag_strips: the pixels along them, tag_fit: drawings fitted;  pixel_edge: what pixels make of edges
 grey_fit     drawings fitted to grey values;  strips: the pixels along edges;  edge_profile: what blur makes of edges
 plane        how a flat target lies in the picture, and how a lens bends it;  smooth: what changes smoothly over it
-labelling    which of a grid's readings is the target's
+labelling    which of a grid's readings is the target's;  two_prints: what is said where it is there twice
 detector     one call for all kinds;  averaging  over several frames of one view
 tracking     measuring where the target is expected;  marks, lattice: what is to be seen there, and beyond
 health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do

@@ -12,6 +12,7 @@ from calib.detection.detection import Detection
 from calib.detection.picture import Picture
 from calib.detection.plane import view_of_most
 from calib.detection.tag_corners import measure_tags
+from calib.detection.two_prints import two_prints
 from calib.errors import DetectionError
 from calib.targets import AprilGrid, marker_dictionary, target_points
 
@@ -82,11 +83,7 @@ def _in_place(target: AprilGrid, ids: NDArray[np.int64], found: NDArray[np.float
 def _not_found(picture: Picture, target: AprilGrid, seen: _SeenTags) -> DetectionError:
     grid = f"the AprilGrid of {target.rows} x {target.columns}"
     if len(seen.twice) and not len(seen.tags):
-        others = f" and {len(seen.twice) - 1} others" if len(seen.twice) > 1 else ""
-        return DetectionError(
-            f"tag {seen.twice[0]}{others} of {grid} can be seen twice, so that nobody knows which is "
-            f"the target's: leave only one print of it in view, and no mirror"
-        )
+        return two_prints("tag", grid, seen.twice)
     return DetectionError(
         f"no tag of {grid} was found: {seen.markers} markers of {target.dictionary} with ids below "
         f"{target.rows * target.columns} were seen in the picture of {picture.size}; is it in the picture, sharp "

@@ -103,7 +103,7 @@ def _stretched(values: NDArray[np.uint8 | np.uint16]) -> NDArray[np.uint8]:
         )
     levels = np.arange(np.iinfo(values.dtype).max + 1)
     table = np.clip(np.rint((levels - dark) * (255.0 / (bright - dark))), 0, 255).astype(np.uint8)
-    return np.asarray(table[values])
+    return np.asarray(cv2.LUT(values, table) if values.dtype == np.uint8 else np.take(table, values))
 
 
 def noise_of(values: NDArray[np.uint8 | np.uint16], apart: int = 3) -> float:

@@ -186,7 +186,10 @@ def test_a_hand_before_the_target_moves_no_point(target):
     found_or_refused(picture, target, readings(drawn, target))
 
 
-def test_two_equal_prints_of_tags_are_refused_by_the_tags_seen_twice():
-    one = drawn_once(NUMBERED[1], size=(600, 600), fill=0.55, noise=1).picture
-    with pytest.raises(DetectionError, match=r"tag 0 and 19 others .* seen twice.*leave only one print"):
-        detect(np.hstack([one, one]), NUMBERED[1])
+@pytest.mark.parametrize(
+    ("target", "twice"), [(NUMBERED[0], "marker 0 and 16"), (NUMBERED[1], "tag 0 and 19")], ids=KINDS[3:]
+)
+def test_two_equal_prints_are_refused_by_what_is_seen_twice(target, twice):
+    one = drawn_once(target, size=(600, 600), fill=0.55, noise=1).picture
+    with pytest.raises(DetectionError, match=f"{twice} others .* seen twice.*leave only one print"):
+        detect(np.hstack([one, one]), target)
