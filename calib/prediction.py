@@ -19,8 +19,8 @@ from calib.nominal import nominal_solution
 from calib.observations import Observation
 from calib.projection import projected
 from calib.residuals import misfits, read_as_predicted
-from calib.session import Intrinsics, Session, View
-from calib.targets import target_points
+from calib.session import Intrinsics, Session
+from calib.targets import Target, target_points
 from calib.unfinished import part_about
 
 Array = NDArray[np.float64]
@@ -34,21 +34,27 @@ FARTHEST = 0.4
 SAME_RAY = 1e-6
 
 
-def predicted_by_calibration(calibration: Calibration, session: Session, view: View) -> Prediction:
-    """Return where the calibrated camera of a view of `session` sees the target at its readings.
+def predicted_by_calibration(
+    calibration: Calibration,
+    target: Target,
+    readings: Sequence[float],
+    camera: str | None = None,
+    approached: Sequence[int] | None = None,
+) -> Prediction:
+    """Return where a calibrated camera sees the target at `readings`.
 
     It may be off by four standard deviations, of the calibration and of its views' residuals together; of the latter
     alone where it does not know the former. Raises CalibError for a camera whose lens or place it does not know, and
     UnsolvableError where neighbouring points may be confused, or none is in the picture.
     """
-    points = calibration.points_of(session.target)
-    camera = session.cameras[session.camera_index(view)].name
-    lens = calibration.cameras[calibration.camera_index(camera)].intrinsics
+    points = calibration.points_of(target)
+    seeing = calibration.cameras[calibration.camera_index(camera)]
+    lens = seeing.intrinsics
     if lens is None:
-        raise UnsolvableError(f"the lens of camera '{camera}' is not known")
-    pose = calibration.world_from_camera(view.readings, camera, view.approached)
+        raise UnsolvableError(f"the lens of camera '{seeing.name}' is not known")
+    pose = calibration.world_from_camera(readings, camera, approached)
     ids, pixels = _in_picture(points, pose, lens)
-    known = calibration.projection_covariance(points[ids], view.readings, camera, view.approached)
+    known = calibration.projection_covariance(points[ids], readings, camera, approached)
     variance = (calibration.quality.rms_px or 0.0) ** 2
     if known is not None:
         variance += float(np.trace(known, axis1=-2, axis2=-1).max())

@@ -14,12 +14,13 @@ from pydantic import TypeAdapter
 
 from calib.calibration import Calibration
 from calib.closed_form import PoseViews
+from calib.detection import Prediction
 from calib.errors import FormatError
-from calib.observations import Progress, observe
+from calib.observations import Observation, Progress, observe
 from calib.prediction import predicted_by_calibration
 from calib.residuals import ViewResidual, view_residuals
 from calib.second_look import second_look
-from calib.session import JointKind, Session
+from calib.session import JointKind, Session, View
 from calib.sweeps import sweep_labels
 from calib.transforms import inverse, rotation_log
 from calib.units import nominal_scale
@@ -102,12 +103,12 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
     _require_same_rig(calibration, session)
     marked = any(view.use == "verify" for view in session.views)
     judged = [index for index, view in enumerate(session.views) if view.use == "verify" or not marked]
-    observed = second_look(
-        session,
-        observe(session, progress, judged),
-        lambda _, view: predicted_by_calibration(calibration, session, view),
-        progress,
-    )
+
+    def predict(_: Sequence[Observation], view: View) -> Prediction:
+        camera = session.cameras[session.camera_index(view)].name
+        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
+
+    observed = second_look(session, observe(session, progress, judged), predict, progress)
     residuals = view_residuals(calibration, session, observed.observations, measure_pose=True)
     errors = np.concatenate([residual.errors for residual in residuals])
     placed = bool(calibration.joints)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from calib.detection.detection import Detection
 from calib.detection.detector import detect
 from calib.detection.health import PictureHealth, picture_health
 from calib.detection.health_in_words import Fault, faults
+from calib.detection.tracking import Prediction, track
 from calib.errors import DetectionError
 from calib.targets import Target
 
@@ -26,13 +28,19 @@ class Inspection:
     faults: tuple[Fault, ...]
 
 
-def inspect(image: NDArray[np.generic], target: Target) -> Inspection:
-    """Look for the target in a picture, as `detect` does, and at the picture itself; raises nothing."""
+def inspect(image: NDArray[np.generic], target: Target, predicted: Prediction | None = None) -> Inspection:
+    """Look for the target in a picture, as `detect` does, and at the picture itself; raises nothing.
+
+    Where it is not found so, it is measured where it is `predicted`.
+    """
     detection, problem, health = None, None, None
     try:
         detection = detect(image, target)
     except DetectionError as error:
         problem = str(error)
+        if predicted is not None:
+            with suppress(DetectionError):
+                detection, problem = track(image, target, predicted), None
     try:
         health = picture_health(image, target, detection)
     except DetectionError as error:

@@ -8,11 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from calib.detection import Detection, Inspection, PictureHealth, inspect
-from calib.errors import ImageError
+from calib import load_calibration
+from calib.detection import Detection, Inspection, PictureHealth, Prediction, inspect
+from calib.errors import ImageError, UnsolvableError
 from calib.picture_file import load_picture
 from calib.targets import Target
 from daemon.cli.console import output, progress_line
+from daemon.cli.pose import Readings, ReadingsFile, wanted_readings
 from daemon.profile import load_target
 
 
@@ -29,17 +31,24 @@ def detect(
             help="The rig's profile: a file, or a shipped one's name; or a file with its [target] alone."
         ),
     ],
+    calibration: Annotated[
+        Path | None,
+        typer.Option(help="A calibration that says where the target is in pictures taken at known readings."),
+    ] = None,
+    readings: Readings = None,
+    readings_file: ReadingsFile = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print all points and figures as JSON.")] = False,
 ) -> int:
     """Look for the target in pictures, and say how good they are, one by one and together."""
     from calib.coverage import coverage, missing_in_words
 
     target = load_target(profile)
+    predicted = _predicted(target, calibration, readings, readings_file, len(pictures))
     looks: list[Inspection] = []
     with progress_line() as progress:
-        for number, path in enumerate(pictures, start=1):
+        for number, (path, where) in enumerate(zip(pictures, predicted, strict=True), start=1):
             progress(f"looking at picture {number} of {len(pictures)}")
-            looks.append(_look(path, target))
+            looks.append(_look(path, target, where))
     seen = [look for look in looks if look.detection is not None]
     # Pictures of one camera: those of another size are not, and count for themselves.
     sizes = {(look.health.width, look.health.height) for look in seen if look.health is not None}
@@ -59,9 +68,36 @@ def detect(
     return 0 if len(seen) == len(looks) else 1
 
 
-def _look(path: Path, target: Target) -> Inspection:
+def _predicted(
+    target: Target,
+    calibration: Path | None,
+    readings: list[float] | None,
+    readings_file: Path | None,
+    count: int,
+) -> list[Prediction | None]:
+    """Return where each of `count` pictures should show the target, as far as that is known."""
+    if calibration is None:
+        if readings is not None or readings_file is not None:
+            raise typer.BadParameter("readings tell where the target is with --calibration only")
+        return [None] * count
+    from calib.prediction import predicted_by_calibration
+
+    loaded = load_calibration(calibration)
+    wanted = wanted_readings(readings, readings_file, [joint.name for joint in loaded.joints])
+    if len(wanted) != count:
+        raise typer.BadParameter(f"there are readings for {len(wanted)} pictures, and {count} pictures")
+    predicted: list[Prediction | None] = []
+    for at in wanted:
+        try:
+            predicted.append(predicted_by_calibration(loaded, target, at))
+        except UnsolvableError:
+            predicted.append(None)
+    return predicted
+
+
+def _look(path: Path, target: Target, predicted: Prediction | None) -> Inspection:
     try:
-        return inspect(load_picture(path), target)
+        return inspect(load_picture(path), target, predicted)
     except ImageError as error:
         # One bad file of many does not keep the others from being looked at.
         return Inspection(None, str(error).removeprefix(f"{path}: "), None, ())

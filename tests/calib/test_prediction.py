@@ -144,7 +144,7 @@ def test_a_target_out_of_the_picture_is_not_predicted_in_it() -> None:
     pixels = bent.project(planned.points, away)
     assert ((pixels > 0) & (pixels < [1280, 960])).all(axis=1).any()
     with pytest.raises(UnsolvableError, match="out of the picture"):
-        predicted_by_calibration(bent, session, session.views[0].model_copy(update={"readings": away}))
+        predicted_by_calibration(bent, session.target, away)
 
 
 def test_views_that_determine_nothing_are_no_error_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,13 +180,13 @@ def test_a_calibration_predicts_views_that_it_has_not_seen(profile: str, method:
     calibration = solve(session, method)
     for view in session.views:
         if view.use == "verify":
-            predicted = predicted_by_calibration(calibration, session, view)
+            predicted = predicted_by_calibration(calibration, session.target, view.readings)
             away, part = planned.misses(session.views.index(view), predicted)
             assert part < A_TENTH
             assert away <= predicted.off
     if method == "ml":
         near, far = (
-            predicted_by_calibration(calibration, session, view.model_copy(update={"readings": at})).off
+            predicted_by_calibration(calibration, session.target, at).off
             for at in (session.views[0].readings, [1.5 * reading for reading in session.views[0].readings])
         )
         assert near <= far

@@ -8,8 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
+from calib import save_calibration, solve
 from daemon.cli.main import main
 from tests.calib.detection.drawn_targets import draw
+from tests.calib.test_partial_views import DISKS, NARROW_PAN, SLIDE, Rig
 
 TABLE = """
 [target]
@@ -101,3 +103,31 @@ def test_a_file_without_a_target_is_refused_by_line(folder: Path, capsys: pytest
     (folder / "bad.toml").write_text("[camera]\n")
     assert run(folder, "left.png", "--profile", "bad.toml") == 1
     assert "target: is missing" in capsys.readouterr().err
+
+
+def test_a_part_of_a_grid_is_found_where_a_calibration_has_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = Rig(tmp_path, DISKS)
+    calibration = solve(rig.session([rig.view(view) for view in [*SLIDE, *NARROW_PAN]]))
+    save_calibration(calibration, tmp_path / "rig.json")
+    cv2.imwrite(str(tmp_path / "part.png"), rig.picture([50.0, -19.0]))
+    (tmp_path / "disks.toml").write_text(
+        '[target]\nkind = "circle_grid"\nrows = 4\ncolumns = 5\npitch = "30 mm"\ndisk_diameter = "18 mm"\n'
+    )
+    asked = ("part.png", "--profile", "disks.toml")
+    knowing = (*asked, "--calibration", str(tmp_path / "rig.json"))
+    assert run(tmp_path, *asked) == 1
+    assert run(tmp_path, *knowing, "--readings", "50", "-19") == 0
+    found = re.search(r"part.png: (\d+) of 20 points", capsys.readouterr().out)
+    assert found is not None
+    assert 8 <= int(found[1]) < 20
+    # Elsewhere, where it would be wholly in the picture or not at all, it is not found.
+    assert run(tmp_path, *knowing, "--readings", "50", "0") == 1
+    assert run(tmp_path, *knowing, "--readings", "50", "150") == 1
+    for wrong in (
+        knowing,
+        (*asked, "--readings", "50", "-19"),
+        ("part.png", *knowing, "--readings", "50", "-19"),
+    ):
+        assert run(tmp_path, *wrong) == 2
