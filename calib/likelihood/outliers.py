@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 RARE = 1e-5
 """How rarely a good measurement may be set aside."""
 TUKEY = 4.685
+WEAKEST = 1e-12  # of the information about a pose
 FREEING_PASSES = 10
 STUDENT = 4.0
 """Degrees of freedom of given poses' errors: other systems have longer tails than a picture's points, in rotation
@@ -230,7 +231,10 @@ def _freed(blocks: Blocks, present: Array) -> Freed:
     weight = present / np.maximum(np.sqrt(square), 1e-12)
     for _ in range(FREEING_PASSES):
         weighted = transposed * np.repeat(weight, 2, axis=1)[:, None]
-        shift = -np.linalg.solve(weighted @ flat, weighted @ right)
+        normal = weighted @ flat
+        # Of a view's few points, those that are kept may not tell all of its pose.
+        normal += (WEAKEST * np.einsum("vii->vi", normal))[:, None] * np.eye(6)
+        shift = -np.linalg.solve(normal, weighted @ right)
         square = _squares(right + flat @ shift)
         typical = np.maximum(_median(square, present), 1e-24)
         reach = TUKEY**2 / MEDIAN[2] * typical[:, None]
