@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 REACH = 12.0  # px to either side of an edge: edges of more than twice this are told as about that wide
 STEP = 0.5  # px between the samples of a profile
-MOST_EDGES = 2500
+MOST_EDGES = 1000
 FEWEST_EDGES = 30
 DIRECTIONS = 12
 FEWEST_IN_A_DIRECTION = 8, 0.05  # edges, and of all of them: corners have a few edges of any direction
@@ -47,22 +47,28 @@ def measure_edges(
 
     `noise` is the standard deviation of the grey values, `reach` (px) how far the next edge is at least.
     """
+    if region is not None:
+        rows, columns = (np.flatnonzero(region.any(axis=axis)) for axis in (1, 0))
+        # Edges at the region's rim are seen in full.
+        beyond = int(np.ceil(reach)) + 1
+        window = tuple(slice(max(at[0] - beyond, 0), at[-1] + beyond + 1) for at in (rows, columns))
+        values, region = values[window], region[window]
     part = values if region is None else values[region]
     dark, bright = np.percentile(part.ravel()[:: 1 + part.size // 100_000], (1, 99))
     step = LEAST_STEP * float(bright - dark)
     if step < CLEAR_OF_NOISE * noise:
         return None
     smooth = cv2.GaussianBlur(values, (0, 0), 1.0)
-    gradient = np.stack([cv2.Scharr(smooth, cv2.CV_32F, 1, 0), cv2.Scharr(smooth, cv2.CV_32F, 0, 1)]) / 32
-    steep = np.hypot(*gradient)
+    along_x, along_y = (cv2.Scharr(smooth, cv2.CV_32F, *order, scale=1 / 32) for order in ((1, 0), (0, 1)))
+    steep = np.asarray(cv2.magnitude(along_x, along_y))
     # Flat enough to catch the widest edge that can be told; which of them are edges the profiles say.
     candidates = steep > max(step / (2 * reach), noise)
     if region is not None:
         candidates &= region
-    y, x = np.nonzero(candidates)
-    chosen = np.linspace(0, len(x) - 1, min(len(x), MOST_EDGES)).astype(int)
-    x, y = x[chosen], y[chosen]
-    normals = (gradient[:, y, x] / steep[y, x]).T.astype(np.float64)
+    places = np.flatnonzero(candidates)
+    chosen = places[np.linspace(0, len(places) - 1, min(len(places), MOST_EDGES)).astype(int)]
+    y, x = np.divmod(chosen, values.shape[1])
+    normals = np.column_stack([along_x[y, x], along_y[y, x]]).astype(np.float64) / steep[y, x, None]
     widths = _widths(values, np.column_stack([x, y]), normals, reach, step)
     known = np.isfinite(widths)
     if known.sum() < FEWEST_EDGES:

@@ -28,6 +28,7 @@ SATURATED = 0.995  # of the full scale
 FULL_SCALES = (1023, 4095, 16383, 65535)
 CELL = 16  # px at least: the picture is looked over for saturated patches in cells of this size
 MOST_CELLS = 40  # a side of the picture
+ENOUGH = 100_000  # pixels, to tell a percentile by
 SATURATED_CELL = 0.25  # of its pixels
 
 Array = NDArray[np.float64]
@@ -132,13 +133,15 @@ def _exposure(
     # A target that was not found may be a small part of the picture.
     rest = 0.1 if region is None else 2.0
     part = values.ravel() if region is None else values[region]
-    ink, paper = np.percentile(part, (rest, 100 - rest)) / full
+    ink, paper = np.percentile(part[:: 1 + part.size // ENOUGH], (rest, 100 - rest)) / full
     share = saturated.mean() if region is None else saturated[region].mean()
     return Exposure(float(ink), float(paper), noise / full, float(share))
 
 
 def _glare(saturated: NDArray[np.bool_], region: NDArray[np.bool_] | None) -> Glare | None:
     """Find the largest patch of neighbouring cells with many saturated pixels."""
+    if not saturated.any():
+        return None
     height, width = saturated.shape
     size = max(CELL, -(-max(height, width) // MOST_CELLS))
     columns, rows = max(width // size, 1), max(height // size, 1)
