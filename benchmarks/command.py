@@ -15,6 +15,7 @@ NAMES: Final = (
     "solve_growth",
     "detection_time",
     "detection_accuracy",
+    "live_rate",
     "pose_rate",
     "efficiency",
     "uncertainty",
