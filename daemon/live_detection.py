@@ -19,7 +19,7 @@ class Sighting:
 
 
 class LiveDetection:
-    """The target in the newest frame of a rig's camera."""
+    """The target in the newest frame of a rig's camera, tracked from look to look."""
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -31,6 +31,8 @@ class LiveDetection:
         async with self._looking:
             frame = await self._rig.frame()
             if self._newest is None or self._newest.frame is not frame:
-                inspection = await asyncio.to_thread(inspect, frame.image, self._rig.profile.target)
+                before = None if self._newest is None else self._newest.inspection.detection
+                target = self._rig.profile.target
+                inspection = await asyncio.to_thread(inspect, frame.image, target, before=before)
                 self._newest = Sighting(frame, self._rig.utc.at(frame.timestamp), inspection)
             return self._newest

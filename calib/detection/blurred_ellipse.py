@@ -22,7 +22,7 @@ Values = NDArray[np.float32]
 CENTRE, SHAPE, BLUR, LIGHT = slice(0, 2), slice(2, 5), 5, slice(6, 10)
 PARAMETERS = 10
 MOST_STEPS = 6
-STANDS_STILL = 0.03  # px; the next step would be a twentieth of it
+STANDS_STILL = 0.03  # px
 LEAST_BLUR = 0.3  # px; a pixel's own square has sqrt(1 / 12)
 LONGEST_STEP = 1.0  # px
 SQRT_2_PI = float(np.sqrt(2 * np.pi))
@@ -82,20 +82,23 @@ class Fitted(NamedTuple):
     variances: Array
 
 
-def fit(start: Ellipses, edges: Samples, plain: Samples) -> Fitted:
-    """Fit ellipses to pixels near their `edges`, and their light to the `plain` paper and ink as well."""
+def fit(start: Ellipses, edges: Samples, plain: Samples, still: float = STANDS_STILL) -> Fitted:
+    """Fit ellipses to pixels near their `edges`, and their light to the `plain` paper and ink as well.
+
+    A step of less than `still` (px) is the last; the next one would be a twentieth of it.
+    """
     ellipses = start
     inside = (start.distances(plain.x, plain.y) > 0).astype(np.float32)
     for _ in range(MOST_STEPS):
         equations = _equations(ellipses, edges, plain, inside)
-        inverses = equations.inverses()
-        steps = np.asarray((inverses @ equations.sides[..., None])[..., 0])
+        steps = equations.solved()
         ellipses = _moved(ellipses, steps)
-        if np.abs(steps[:, CENTRE]).max() < STANDS_STILL:
+        if np.abs(steps[:, CENTRE]).max() < still:
             break
     counts = np.count_nonzero(edges.weights, axis=1) + np.count_nonzero(plain.weights, axis=1)
-    variances = equations.squares / np.maximum(counts - PARAMETERS, 1)
-    return Fitted(ellipses, inverses[:, CENTRE, CENTRE] * variances[:, None, None], variances)
+    left = equations.squares - np.sum(equations.sides * steps, axis=1)
+    variances = np.maximum(left, 0) / np.maximum(counts - PARAMETERS, 1)
+    return Fitted(ellipses, equations.inverses_of_centres() * variances[:, None, None], variances)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +109,24 @@ class _Equations:
     sides: Array
     squares: Array
 
-    def inverses(self) -> Array:
-        """Return the inverse matrices, in units in which the entries are of one size while they are inverted."""
+    def solved(self) -> Array:
+        """Return the solutions (n, 10)."""
+        units, scaled = self._scaled()
+        solutions = np.linalg.solve(scaled, (units * self.sides)[..., None])[..., 0]
+        return np.asarray(units * solutions)
+
+    def inverses_of_centres(self) -> Array:
+        """Return the part (n, 2, 2) of the inverse matrices that belongs to the centres."""
+        units, scaled = self._scaled()
+        of_centres = np.broadcast_to(np.eye(PARAMETERS)[:, CENTRE], (len(units), PARAMETERS, 2))
+        inverses = np.linalg.solve(scaled, of_centres)[:, CENTRE]
+        return np.asarray(inverses * units[:, CENTRE, None] * units[:, None, CENTRE])
+
+    def _scaled(self) -> tuple[Array, Array]:
+        """Return the parameters' units (n, 10) in which the entries are of one size, and the matrices in them."""
         units = 1 / np.sqrt(np.maximum(np.einsum("nii->ni", self.matrices), TINY))
-        scales = units[:, :, None] * units[:, None]
-        return np.asarray(scales * np.linalg.inv(self.matrices * scales + RIDGE * np.eye(PARAMETERS)))
+        scaled = self.matrices * (units[:, :, None] * units[:, None])
+        return units, scaled + RIDGE * np.eye(PARAMETERS)
 
 
 class _Seen(NamedTuple):

@@ -35,7 +35,7 @@ UNMEASURED_VARIANCE = 0.5**2  # px²; where the drawing does not fit
 
 
 @dataclass(frozen=True, eq=False)
-class _Crossings:
+class Crossings:
     """Roughly what n corners look like: two edges cross at each of the `pixels` (n, 2).
 
     `directions` (n, 2, 2) are the unit vectors along the one and the other; `bends` (n, 2) their curvatures in
@@ -50,6 +50,16 @@ class _Crossings:
     lengths: Floats
     clear: Floats
 
+    def heights(self, x: Singles, y: Singles) -> tuple[Singles, Singles]:
+        """Tell how far (n, m) to the right of the one edge and of the other places (n, m) are, px from the corners."""
+        directions, bends = (each.astype(np.float32)[..., None] for each in (self.directions, self.bends))
+        heights: list[Singles] = []
+        for edge in range(2):
+            unit_x, unit_y = directions[:, edge, 0], directions[:, edge, 1]
+            along_it = unit_x * x + unit_y * y
+            heights.append(np.asarray(unit_x * y - unit_y * x - bends[:, edge] / 2 * along_it * along_it))
+        return heights[0], heights[1]
+
 
 def measure_corners(
     picture: Picture, view: PlaneView, points: Floats, pixels: Floats, pitch: float, clear: float
@@ -60,7 +70,7 @@ def measure_corners(
     sides. Gives the pixels (n, 2), and their covariances (n, 2, 2) in px².
     """
     n = len(pixels)
-    crossings = _crossings(bent_view(view, points, pixels, BENDS_DEGREE), points, pixels, pitch, clear)
+    crossings = crossings_of(bent_view(view, points, pixels, BENDS_DEGREE), points, pixels, pitch, clear)
     near = replace(crossings, lengths=np.minimum(crossings.lengths, FIRST_LENGTH))
     rough = _fit(picture, near, FIRST_WIDTH, np.full(n, FIRST_BLUR), Light.unknown(n))
     good = rough.converged
@@ -74,11 +84,11 @@ def measure_corners(
         picture = replace(picture, values=np.asarray(softened, dtype=np.float32))
         blurs = np.hypot(blurs, SOFTENING)
 
-    crossings = _crossings(
+    crossings = crossings_of(
         bent_view(view, points[good], pixels[good], BENDS_DEGREE), points, pixels, pitch, clear
     )
     levels = np.log(np.maximum(rough.means + np.abs(rough.steps), 1))
-    light = _light(pixels, levels, good, float(np.median(crossings.lengths)))
+    light = light_at(pixels, levels, good, float(np.median(crossings.lengths)))
     blur = float(np.median(blurs))
     width = max(min(SHOWN * blur, float(np.median(crossings.clear)) - NEIGHBOURS_REACH * blur), NARROWEST)
     fit = _fit(picture, crossings, width, blurs, light)
@@ -89,7 +99,8 @@ def measure_corners(
     return pixels, np.where(good[:, None, None], measured, UNMEASURED_VARIANCE * np.eye(2))
 
 
-def _crossings(view: BentView, points: Floats, pixels: Floats, pitch: float, clear: float) -> _Crossings:
+def crossings_of(view: BentView, points: Floats, pixels: Floats, pitch: float, clear: float) -> Crossings:
+    """Say what the corners look like that a view shows at points (n, 2), and that are roughly at pixels (n, 2)."""
     steps = pitch / 2 * np.eye(2)
     middle = view.project(points)[:, None]
     ahead, behind = (view.project(points[:, None] + sign * steps) for sign in (1, -1))
@@ -99,10 +110,10 @@ def _crossings(view: BentView, points: Floats, pixels: Floats, pitch: float, cle
     bends = _cross(directions, ahead + behind - 2 * middle) / (spacings / 2) ** 2
     # Edges that are not at right angles are nearer to the next ones than the spacing says.
     apart = spacings.min(axis=1) * np.abs(_cross(directions[:, 0], directions[:, 1]))
-    return _Crossings(pixels, directions, bends, REACHED * spacings, apart * clear / pitch)
+    return Crossings(pixels, directions, bends, REACHED * spacings, apart * clear / pitch)
 
 
-def _light(pixels: Floats, levels: Floats, good: NDArray[np.bool_], apart: float) -> Light:
+def light_at(pixels: Floats, levels: Floats, good: NDArray[np.bool_], apart: float) -> Light:
     """Follow the light's logarithms (n,) from good corner to good corner, which are so far `apart` (px)."""
     light = smooth(pixels[good], levels[good, None], LIGHTS_DEGREE)
     slopes = [(light.at(pixels + step) - light.at(pixels - step)) / 2 for step in np.eye(2)]
@@ -110,32 +121,22 @@ def _light(pixels: Floats, levels: Floats, good: NDArray[np.bool_], apart: float
     return Light(np.concatenate(slopes, axis=1), max(off / apart, LEAST_SLOPE))
 
 
-def _fit(picture: Picture, crossings: _Crossings, width: float, blurs: Floats, light: Light) -> GreyFit:
+def _fit(picture: Picture, crossings: Crossings, width: float, blurs: Floats, light: Light) -> GreyFit:
     start = np.column_stack([np.zeros((len(blurs), 2)), np.log(blurs)])
     least = np.array([-np.inf, -np.inf, np.log(LEAST_BLUR)])
     patches, heights = _patches(picture, crossings, width)
-    shape = partial(_saddle, crossings.directions.astype(np.float32), heights)
+    shape = partial(saddle, crossings.directions.astype(np.float32), heights)
     return fit_grey_values(picture, patches, shape, start, least, light)
 
 
-def _patches(
-    picture: Picture, crossings: _Crossings, width: float
-) -> tuple[Patches, tuple[Singles, Singles]]:
+def _patches(picture: Picture, crossings: Crossings, width: float) -> tuple[Patches, tuple[Singles, Singles]]:
     """Take the pixels along both edges of each crossing; and how far (n, m) they are to the right of either."""
     reach = crossings.lengths[..., None] * crossings.directions
     along = [strips(picture, crossings.pixels, -reach[:, edge], reach[:, edge], width) for edge in range(2)]
     x, y, values, used = (
         np.concatenate([getattr(each, field.name) for each in along], axis=1) for field in fields(Patches)
     )
-    directions, bends = (
-        each.astype(np.float32)[..., None] for each in (crossings.directions, crossings.bends)
-    )
-    heights = []
-    for edge in range(2):
-        unit_x, unit_y = directions[:, edge, 0], directions[:, edge, 1]
-        along_it = unit_x * x + unit_y * y
-        heights.append(unit_x * y - unit_y * x - bends[:, edge] / 2 * along_it * along_it)
-    one, other = heights
+    one, other = crossings.heights(x, y)
     # Where the strips overlap, a pixel belongs to the edge that it is nearer to.
     nearer = np.abs(one) <= np.abs(other)
     m = along[0].x.shape[1]
@@ -144,7 +145,7 @@ def _patches(
     return Patches(x, y, values, used), (one, other)
 
 
-def _saddle(
+def saddle(
     directions: Singles, heights: tuple[Singles, Singles], parameters: Floats
 ) -> tuple[Singles, Singles]:
     """Draw corners of parameters (n, 3): how far off in x and y, and the blur's logarithm."""

@@ -40,13 +40,14 @@ class GreyFit:
     """Each piece's shape: `parameters` (n, k), their `covariances` (n, k, k), and which have `converged` (n,).
 
     `means` (n,) are the grey values between those where the shape is 1 and those where it is -1, and `steps` (n,)
-    halves of the difference.
+    halves of the difference; `scatters` (n,) are the standard deviations of the grey values about the drawing.
     """
 
     parameters: Floats
     covariances: Floats
     means: Floats
     steps: Floats
+    scatters: Floats
     converged: NDArray[np.bool_]
 
 
@@ -97,7 +98,7 @@ def fit_grey_values(
     variance = np.maximum(np.square(residuals).sum(axis=1) / freedom, ROUNDING_VARIANCE)
     covariances = variance[:, None, None] * np.linalg.inv(normal)[:, :k, :k]
     converged = (moved < 5 * STANDS_STILL) & np.isfinite(fitted).all(axis=1)
-    return GreyFit(fitted[:, :k], covariances, fitted[:, k], fitted[:, k + 1], converged)
+    return GreyFit(fitted[:, :k], covariances, fitted[:, k], fitted[:, k + 1], np.sqrt(variance), converged)
 
 
 def _levels(drawn: Singles, patches: Patches) -> Floats:

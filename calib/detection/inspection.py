@@ -16,6 +16,8 @@ from calib.detection.tracking import Prediction, track
 from calib.errors import DetectionError
 from calib.targets import Target
 
+MOVED = 20.0  # px, from frame to frame; what is faster is blurred, and looked for anew
+
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
@@ -28,14 +30,20 @@ class Inspection:
     faults: tuple[Fault, ...]
 
 
-def inspect(image: NDArray[np.generic], target: Target, predicted: Prediction | None = None) -> Inspection:
+def inspect(
+    image: NDArray[np.generic],
+    target: Target,
+    predicted: Prediction | None = None,
+    before: Detection | None = None,
+) -> Inspection:
     """Look for the target in a picture, as `detect` does, and at the picture itself; raises nothing.
 
-    Where it is not found so, it is measured where it is `predicted`.
+    The target is tracked from where it was `before`, in the last frame, and looked for in the whole picture where it is
+    not there any more. Where it is not found so, it is measured where it is `predicted`.
     """
     detection, problem, health = None, None, None
     try:
-        detection = detect(image, target)
+        detection = _tracked(image, target, before) or detect(image, target)
     except DetectionError as error:
         problem = str(error)
         if predicted is not None:
@@ -46,3 +54,12 @@ def inspect(image: NDArray[np.generic], target: Target, predicted: Prediction | 
     except DetectionError as error:
         problem = str(error)
     return Inspection(detection, problem, health, () if health is None else tuple(faults(health)))
+
+
+def _tracked(image: NDArray[np.generic], target: Target, before: Detection | None) -> Detection | None:
+    if before is None:
+        return None
+    try:
+        return track(image, target, Prediction.of(before, MOVED))
+    except DetectionError:
+        return None

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
 
 from calib.targets import AsymmetricCircleGrid, Chessboard, CircleGrid, target_points
 
@@ -31,17 +32,26 @@ class Lattice:
     steps_beyond: NDArray[np.float64]
     occupied: NDArray[np.float32]
 
-    def is_certain(self, seen: NDArray[np.bool_], empty: NDArray[np.bool_]) -> bool:
-        """Tell whether no shift of the grid explains the points `seen` (n,) and places `empty` (b,) beyond the rim."""
+    @cached_property
+    def padded(self) -> NDArray[np.float32]:
+        """The lattice `occupied`, with as much round it as a shift may take."""
+        height, width = self.occupied.shape
+        return np.pad(self.occupied, ((height - 1, height - 1), (width - 1, width - 1)))
+
+    def is_certain(self, seen: NDArray[np.int64], empty: NDArray[np.int64]) -> bool:
+        """Tell whether no shift of the grid explains the points `seen` and that places beyond the rim are `empty`."""
         evidence = np.zeros_like(self.occupied)
         evidence[self.rows[seen], self.columns[seen]] = 1
         evidence[self.rows_beyond[empty], self.columns_beyond[empty]] = -1
-        # Shifted, the grid has a point where one was seen, or where none was.
-        explained = correlate(self.occupied, evidence)
-        against = seen.sum() - np.rint(explained)
-        unshifted = tuple(side - 1 for side in self.occupied.shape)
-        against[unshifted] = FEWEST_WITNESSES
-        return bool(against.min() >= FEWEST_WITNESSES)
+        # Shifted, the grid has a point where one was seen, or where none is.
+        height, width = self.occupied.shape
+        padded = np.pad(self.occupied, ((height - 1, height - 1), (width - 1, width - 1)))
+        explained = np.asarray(
+            cv2.filter2D(padded, -1, evidence, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT)
+        )
+        against = len(seen) - explained[: 2 * height - 1, : 2 * width - 1]
+        against[height - 1, width - 1] = FEWEST_WITNESSES
+        return bool(against.min() > FEWEST_WITNESSES - 0.5)
 
 
 def lattice_of(target: Grid) -> Lattice:

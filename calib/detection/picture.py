@@ -50,6 +50,13 @@ def grey_values(
 
     Raises DetectionError where it is no such picture.
     """
+    require_picture(image)
+    depth = np.uint8 if image.dtype.itemsize == 1 else np.uint16
+    return _as_grey(np.ascontiguousarray(image[part], dtype=depth))
+
+
+def require_picture(image: NDArray[np.generic]) -> None:
+    """Raise DetectionError, which says what it is, where an array is no such picture."""
     # OpenCV's readers return None for a file that is no picture, whatever the annotation says.
     if not isinstance(image, np.ndarray):
         raise DetectionError("there is no picture to look at: an array of grey or BGR values is needed")
@@ -66,8 +73,6 @@ def grey_values(
         raise DetectionError(
             f"a picture of {width} x {height} px is too small to hold a target: check the camera's format"
         )
-    depth = np.uint8 if image.dtype.itemsize == 1 else np.uint16
-    return _as_grey(np.ascontiguousarray(image[part], dtype=depth))
 
 
 def copies(grey: NDArray[np.uint8], side: int) -> Iterator[tuple[NDArray[np.uint8], float]]:

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from calib.detection.smooth import Smooth, smooth
 
+FEWEST = 4  # points that tell a plane's view
+NARROWEST = 1e-6  # m; points that are off a line by no more are on it
+
 
 @dataclass(frozen=True, eq=False)
 class PlaneView:
@@ -22,6 +25,10 @@ class PlaneView:
         H = self.picture_from_plane
         homogeneous = points @ H[:, :2].T + H[:, 2]
         return np.asarray(homogeneous[..., :2] / homogeneous[..., 2:])
+
+    def moved(self, homography: NDArray[np.float64]) -> PlaneView:
+        """Return the view of the same plane in a picture that a homography (3, 3) has moved."""
+        return PlaneView(homography @ self.picture_from_plane)
 
     def jacobians(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Give matrices (n, 2, 2) in px/m that take small steps at points (n, 2) to the picture."""
@@ -55,9 +62,17 @@ def bent_view(
     return BentView(view, smooth(seen, pixels - seen, degree))
 
 
+def span_a_plane(points: NDArray[np.float64]) -> bool:
+    """Tell whether points (n, 2), in m, are four or more that are not on one line."""
+    if len(points) < FEWEST:
+        return False
+    off = points - points.mean(axis=0)
+    return bool(np.linalg.eigvalsh(off.T @ off)[0] > NARROWEST**2)
+
+
 def view_of_plane(points: NDArray[np.float64], pixels: NDArray[np.float64]) -> PlaneView | None:
     """Fit the view to all points (n, 2) and their pixels; None where the points do not span a plane."""
-    if len(points) < 4 or np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-9) < 2:
+    if not span_a_plane(points):
         return None
     homography, _ = cv2.findHomography(points, pixels)
     return _view(homography)
@@ -67,7 +82,7 @@ def view_of_most(
     points: NDArray[np.float64], pixels: NDArray[np.float64], tolerance: float
 ) -> tuple[PlaneView, NDArray[np.bool_]] | None:
     """Fit the view to the most points that agree to `tolerance` (px); give it, and which (n,) they are."""
-    if len(points) < 4:
+    if len(points) < FEWEST:
         return None
     homography, agreeing = cv2.findHomography(points, pixels, cv2.RANSAC, tolerance)
     view = _view(homography)

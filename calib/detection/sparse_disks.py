@@ -11,12 +11,14 @@ from calib.detection.blurred_ellipse import Array, Ellipses, Samples, fit
 from calib.detection.disks import UNMODELLED_VARIANCE
 
 APART = 1.42  # px; two places further apart than a pixel's diagonal are never in the same one
-ACROSS = APART * np.arange(-3, 4)  # px from the edge
-FEWEST_RAYS, MOST_RAYS = 12, 36
+ACROSS = APART * np.arange(-2, 3)  # px from the edge
+FEWEST_RAYS, MOST_RAYS = 12, 24
 INNERMOST = 0.3  # of the radius: further in, rays are too dense
-LIGHT_RAYS = 8
+PLAIN = 5.0  # px from the edge; there the blur has ended
+LIGHT_RAYS = 6
 LIGHT_AT = np.array([0.0, 0.4, 0.7, 1.25, 1.5])  # radii
 FIRST_BLUR = 0.9  # px
+STANDS_STILL = 0.1  # px; the next step would be less than such points scatter
 LEAST_COVERED, MOST_COVERED = 0.7, 1.4  # of the expected area
 
 
@@ -61,7 +63,7 @@ def sparse_centroids(values: NDArray[np.uint8 | np.uint16], disks: SparseDisks) 
     few = disks.shapes @ _circle(LIGHT_RAYS)
     at = np.broadcast_to(LIGHT_AT[:, None], (len(few), len(LIGHT_AT), LIGHT_RAYS))
     apart = np.abs(at - 1) * np.sqrt(np.square(few).sum(axis=1))[:, None]
-    plain = _samples(values, disks, few, at, (apart > ACROSS[-1] + 1) & (at < disks.clear))
+    plain = _samples(values, disks, few, at, (apart > PLAIN) & (at < disks.clear))
 
     with np.errstate(all="ignore"):  # what is no disk may lead anywhere, and is found out afterwards
         inverses = np.linalg.inv(disks.shapes @ disks.shapes.swapaxes(1, 2))
@@ -73,7 +75,7 @@ def sparse_centroids(values: NDArray[np.uint8 | np.uint16], disks: SparseDisks) 
             ink=disks.ink,
             slopes=np.zeros_like(disks.centres),
         )
-        ellipses, covariances, variances = fit(start, edges, plain)
+        ellipses, covariances, variances = fit(start, edges, plain, STANDS_STILL)
         xx, xy, yy = ellipses.shapes.T
         covered = 1 / (np.sqrt(xx * yy - xy**2) * radii**2)
         good = (covered > LEAST_COVERED) & (covered < MOST_COVERED)

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Literal, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.corners import measure_corners
+from calib.detection.corners import crossings_of
 from calib.detection.detection import Detection
 from calib.detection.lattice import Lattice
 from calib.detection.marks import Marks, marks_of
-from calib.detection.picture import Picture, grey_values, noise_of
-from calib.detection.plane import BentView, bent_view, view_of_plane
+from calib.detection.picture import Picture, grey_values, noise_of, require_picture
+from calib.detection.plane import FEWEST, BentView, PlaneView, bent_view, span_a_plane, view_of_plane
+from calib.detection.smooth import smooth
+from calib.detection.sparse_corners import sparse_corners
 from calib.detection.sparse_disks import SparseDisks, sparse_centroids
 from calib.detection.tag_corners import measure_tags
 from calib.errors import DetectionError
@@ -31,16 +34,23 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FURTHEST = 0.45  # of the distance between marks: what is further off is nearer to another one's place
-ACROSS = (np.arange(9) + 0.5) / 4.5 - 1  # places across an edge, in parts of what is clear to both sides
+PLACES_ACROSS = 9  # an edge
+SCATTERED = 0.7549, 0.5698  # steps whose multiples, less whole numbers, are evenly spread
 SMALLEST = 8  # px
-NOISE_SAMPLES = 10_000
+NOISE_SAMPLES = 2_500
 CLEAR_OF_NOISE = 4.0  # times the noise: less is no contrast
-AGREEING, DISAGREEING = 0.9, 0.8  # of a mark's samples have the right colour, or it is none
+DISAGREEING = 0.8  # of the samples, where a mark surely is none
 CLEARLY = 0.2  # of the contrast: a colour is so far from the middle of the two
 ALIKE = 0.4  # of the median contrast
-MISPLACED = 0.06  # of the distance between marks, more than a lens bends what a cubic does not; and
-MISPLACED_PX = 0.5
-FEWEST = 4  # points
+TOGETHER = 0.3  # of what is clear across edges, that marks may move apart and be of one target
+NO_INK, LEAST_BARE = 0.3, 0.4  # of the contrast from ink, and of the places where a mark has ink
+OFF_DEGREE, OFF_TIMES, OFF_PX = (
+    1,
+    5.0,
+    (0.3, 1.5),
+)  # of what is smooth; times the median off it, within limits
+MOST_MISSING = 0.1  # of the points confirmed; a row or column is more
+MISPLACED, MISPLACED_PX = 0.05, 0.75  # of the distance between marks, and px more
 LEFT = 0.06  # of the contrast, by a fit; and
 LEFT_OF_NOISE = 3.0  # times the noise
 
@@ -74,37 +84,32 @@ def track(image: NDArray[np.generic], target: Target, predicted: Prediction) -> 
     Raises DetectionError where too few points are there to be sure of them: look for the target with `detect`.
     """
     marks = marks_of(target)
-    places = _Places.expected(target, marks, _view(target, predicted))
+    places = _Places.expected(marks, _view(target, predicted))
     window = _window(image, places, predicted.off)
     places = places.moved([-window.left, -window.top])
-    sign, shifts = _searched(window, marks, places, predicted.off)
-    places = _together(places, *_shifted(window, places, sign, shifts))
+    places = _together(places, *_shifts(window, marks, places, predicted.off))
 
-    looks = _look(window, places.samples, sign * marks.colours)
-    agreeing = looks.agreeing > AGREEING
-    usual = float(np.median(looks.contrasts[agreeing])) if agreeing.any() else 0.0
-    seen = agreeing & (looks.contrasts > ALIKE * usual)
-    measured = _measured(window, target, marks, places, looks, np.flatnonzero(seen))
-    in_place = _in_place(target, marks, measured)
-    ids = measured.ids[in_place]
-    pixels = measured.pixels[in_place]
-    view = view_of_plane(target_points(target)[ids, :2], pixels)
-    if len(ids) < FEWEST or view is None:
+    looks = _look(window, marks, places)
+    own = len(marks.points)
+    chosen = np.flatnonzero(looks.agreeing[:own] >= marks.agreeing)
+    measured = _measured(window, target, marks, places, looks, chosen)
+    ids = marks.points[chosen][measured.good]
+    if not span_a_plane(target_points(target)[ids, :2]):
         raise DetectionError(
             f"the {target.kind.replace('_', ' ')} is not where it was predicted to within {predicted.off:.0f} px: "
             f"of its {len(target_points(target))} points {len(ids)} were confirmed, and {FEWEST} not on one line are "
             "needed; look for it in the whole picture"
         )
-    if marks.lattice is not None and not _is_certain(window, marks, marks.lattice, places, usual, ids):
+    if marks.lattice is not None and not _is_unshifted(marks.lattice, marks, looks, ids):
         raise DetectionError(
-            f"{len(ids)} of {len(marks.points)} points of the {target.kind.replace('_', ' ')} were confirmed, but the "
-            "grid may be shifted by some rows or columns, as its ends are not seen; look for it in the whole picture"
+            f"{len(ids)} of {own} points of the {target.kind.replace('_', ' ')} were confirmed, but the grid may be "
+            "shifted by some rows or columns, as its ends are not seen; look for it in the whole picture"
         )
     disk: Literal["centroid"] | None = (
         "centroid" if isinstance(target, CircleGrid | AsymmetricCircleGrid) else None
     )
-    origin = np.array([window.left, window.top])
-    return Detection(ids, pixels + origin, measured.covariances[in_place], disk)
+    pixels = measured.pixels[measured.good] + [window.left, window.top]
+    return Detection(ids, pixels, measured.covariances[measured.good], disk)
 
 
 def _view(target: Target, predicted: Prediction) -> BentView:
@@ -119,47 +124,53 @@ def _view(target: Target, predicted: Prediction) -> BentView:
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Where marks are in the picture, in px: as `Marks` says in m, and beyond a grid's rim as if it went on."""
+    """Where in the picture `marks` are: what they say in m, in px.
 
-    points: Array  # (m, q, 2)
-    samples: Array  # (m, k, 2)
-    edges: Array  # (m, j, 2)
-    ahead: Array  # (m, j, 2), as far from the edges as is clear
-    beyond: Array  # (b, k, 2)
+    `listed` (n, 2) are the places as the marks list them, in the `view`; `across` (m, j, 2) is what is clear across
+    edges.
+    """
+
+    marks: Marks
+    view: BentView
+    listed: Array
+    across: Array
 
     @classmethod
-    def expected(cls, target: Target, marks: Marks, view: BentView) -> _Places:
+    def expected(cls, marks: Marks, view: BentView) -> _Places:
         """Project the marks; the lens bends each as it bends its middle."""
-        points = target_points(target)[:, :2]
         bend = view.project(marks.middles) - view.view.project(marks.middles)
-        samples, edges, ahead = (
-            view.view.project(part) + bend[:, None]
-            for part in (marks.samples, marks.edges, marks.edges + marks.clear * marks.outwards)
-        )
-        beyond = np.empty((0, *marks.samples.shape[1:]))
-        if marks.lattice is not None:
-            nearest = marks.lattice.nearest
-            beyond = marks.samples[nearest] + marks.lattice.steps_beyond[:, None]
-            beyond = view.view.project(beyond) + bend[nearest, None]
-        return cls(view.project(points[marks.points]), samples, edges, ahead, beyond)
+        listed = view.view.project(marks.places) + bend[marks.owners]
+        edges, ahead = listed[-marks.edges.size :].reshape(2, *marks.edges.shape)
+        return cls(marks, view, listed, ahead - edges)
+
+    @property
+    def points(self) -> Array:
+        """Of each mark (m, q, 2)."""
+        return self.listed[: self.marks.points.size].reshape(self.marks.positions.shape)
+
+    @property
+    def samples(self) -> Array:
+        """Of each mark, and of each place beyond a grid's rim (m + b, k, 2)."""
+        first = self.marks.points.size
+        samples = self.listed[first : first + self.marks.colours.size]
+        return samples.reshape(self.marks.samples.shape)
+
+    @property
+    def edges(self) -> Array:
+        """Of each mark (m, j, 2)."""
+        first = self.marks.points.size + self.marks.colours.size
+        return self.listed[first : first + self.marks.edges.size // 2].reshape(self.marks.edges.shape)
 
     def moved(self, step: Sequence[int]) -> _Places:
         """Shift all places by (2,) px."""
-        return _Places(*(part + step for part in self._parts()))
+        bend = replace(self.view.bend, middle=self.view.bend.middle + step)
+        view = BentView(self.view.view.moved(np.array([[1.0, 0, step[0]], [0, 1, step[1]], [0, 0, 1]])), bend)
+        return _Places(self.marks, view, self.listed + step, self.across)
 
     def mapped(self, homography: Array) -> _Places:
-        """Move all places by a homography (3, 3) of the picture."""
-        parts = self._parts()
-        flat = np.concatenate([part.reshape(-1, 2) for part in parts])
-        moved = flat @ homography[:2, :2].T + homography[:2, 2]
-        moved /= (flat @ homography[2, :2] + homography[2, 2])[:, None]
-        ends = np.cumsum([part.size // 2 for part in parts])[:-1]
-        return _Places(
-            *(piece.reshape(part.shape) for piece, part in zip(np.split(moved, ends), parts, strict=True))
-        )
-
-    def _parts(self) -> tuple[Array, ...]:
-        return self.points, self.samples, self.edges, self.ahead, self.beyond
+        """Move all places by a homography (3, 3) of the picture, which hardly turns or scales."""
+        view = BentView(self.view.view.moved(homography), self.view.bend)
+        return _Places(self.marks, view, PlaneView(homography).project(self.listed), self.across)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,173 +191,214 @@ class _Window:
 
     def holds(self, pixels: Array) -> Mask:
         """Tell for which rows all pixels (m, k, 2) are in the window."""
-        last = np.array(self.values.shape[::-1]) - 1
-        return np.asarray(((pixels >= 0) & (pixels <= last)).all(axis=(1, 2)))
+        height, width = self.values.shape
+        x, y = pixels[..., 0], pixels[..., 1]
+        return np.asarray(((x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)).all(axis=1))
 
 
 def _window(image: NDArray[np.generic], places: _Places, off: float) -> _Window:
-    around = np.concatenate([part.reshape(-1, 2) for part in (places.samples, places.ahead, places.beyond)])
-    size = np.array(image.shape[1::-1])
-    first = np.clip(np.floor(around.min(axis=0) - off), 0, size)
-    last = np.clip(np.ceil(around.max(axis=0) + off) + 1, 0, size)
-    if not np.all(last - first > SMALLEST):
-        raise DetectionError("the target is predicted to be out of the picture")
-    (left, top), (right, bottom) = first.astype(int), last.astype(int)
-    values = grey_values(image, (slice(top, bottom), slice(left, right)))
-    apart = max(round(np.sqrt(values.size / NOISE_SAMPLES)), 1)
-    return _Window(values, int(left), int(top), noise_of(values, apart))
-
-
-class _Looks(NamedTuple):
-    """How marks look: their `paper` and `ink` (m,), and the part of the samples (m,) that has the right colour."""
-
-    paper: Array
-    ink: Array
-    contrasts: Array
-    agreeing: Array
-
-
-def _look(window: _Window, samples: Array, colours: NDArray[np.float32]) -> _Looks:
-    """Compare samples (m, k, 2) to the colours (m, k); what is not wholly in the window agrees in nothing."""
-    values = window.at(samples)
-    of_paper = colours > 0
-    count = np.maximum(of_paper.sum(axis=1), 1)
-    paper = (values * of_paper).sum(axis=1) / count
-    ink = (values * ~of_paper).sum(axis=1) / np.maximum(colours.shape[1] - count, 1)
-    contrasts = paper - ink
-    clear = (values - ((paper + ink) / 2)[:, None]) * colours > CLEARLY * contrasts[:, None]
-    agreeing = np.where(contrasts > CLEAR_OF_NOISE * window.noise, clear.mean(axis=1), 0.0)
-    return _Looks(paper, ink, contrasts, np.where(window.holds(samples), agreeing, 0.0))
-
-
-def _searched(window: _Window, marks: Marks, places: _Places, off: float) -> tuple[int, Array]:
-    """Try shifts of up to `off` px of each mark by itself: where ink and paper differ most.
-
-    Gives the colours' sign, and the shifts (m, 2).
-    """
-    across = np.linalg.norm(places.ahead - places.edges, axis=-1)
-    step = max(float(across.min()), 1.0)
-    furthest = min(off, FURTHEST * marks.spacing / marks.clear * float(across.min()))
-    count = int(np.floor(furthest / step)) if furthest > step else 0
-    along = step * np.arange(-count, count + 1)
-    shifts = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 1, 1, 2)
-    shifts = shifts[np.hypot(*shifts.reshape(-1, 2).T) <= max(furthest, 0)]
-    of_paper = marks.colours > 0
-    factors = np.where(of_paper, 1, -1) / np.where(
-        of_paper, of_paper.sum(axis=1, keepdims=True), (~of_paper).sum(axis=1, keepdims=True)
+    require_picture(image)
+    (left, right), (top, bottom) = (
+        np.clip([np.floor(at.min() - off), np.ceil(at.max() + off) + 1], 0, size).astype(int).tolist()
+        for at, size in zip(places.listed.T, image.shape[1::-1], strict=True)
     )
-    contrasts = np.einsum("tmk,mk->tm", window.at(places.samples + shifts), factors.astype(np.float32))
-    sign = 1
-    if marks.either_way and contrasts.max(axis=0).sum() < -contrasts.min(axis=0).sum():
-        sign = -1
-    best = (sign * contrasts).argmax(axis=0)
-    return sign, shifts[best, 0, 0]
+    if min(right - left, bottom - top) < SMALLEST:
+        raise DetectionError("the target is predicted to be out of the picture")
+    part = slice(top, bottom), slice(left, right)
+    apart = max(round(sqrt((bottom - top) * (right - left) / NOISE_SAMPLES)), 1)
+    if image.ndim == 2:
+        values = grey_values(image)
+        return _Window(values, 0, 0, noise_of(values[part], apart))
+    values = grey_values(image, part)
+    return _Window(values, left, top, noise_of(values, apart))
 
 
-def _shifted(window: _Window, places: _Places, sign: int, shifts: Array) -> tuple[Array, Mask]:
-    """Find how far (m, 2) the edges of marks are from where they are expected, but for the shifts (m, 2)."""
-    edges = places.edges + shifts[:, None]
-    outwards = places.ahead - places.edges
-    values = window.at(edges[:, :, None] + ACROSS[:, None] * outwards[:, :, None])
+def _shifts(window: _Window, marks: Marks, places: _Places, off: float) -> tuple[Array, Mask]:
+    """Find how far (m, 2) the edges of marks are from where they are expected, and which marks (m,) have contrast."""
+    lengths = np.hypot(places.across[..., 0], places.across[..., 1])
+    shifts = _searched(window, marks, places, off, float(lengths.min()))
+    edges = places.edges if shifts is None else places.edges + shifts[:, None]
+    # Each edge is looked at elsewhere between the places of the others, so that their errors cancel.
+    by_mark, by_edge = (step * np.arange(count) for step, count in zip(SCATTERED, lengths.shape, strict=True))
+    between = (by_mark[:, None] + by_edge) % 1 - 0.5
+    along = (2 * (np.arange(PLACES_ACROSS) + between[..., None]) + 1) / PLACES_ACROSS - 1
+    values = window.at(edges[:, :, None] + along[..., None] * places.across[:, :, None])
     darkest, brightest = values.min(axis=(1, 2)), values.max(axis=(1, 2))
-    dark = values < ((darkest + brightest) / 2)[:, None, None]
-    ink = (dark if sign > 0 else ~dark).mean(axis=2)
-    lengths = np.linalg.norm(outwards, axis=-1)
-    normals = outwards / lengths[..., None]
-    off = lengths * (2 * ink - 1)
+    inside = (values < ((darkest + brightest) / 2)[:, None, None]).mean(axis=2)
+    if marks.either_way and np.sum(values[..., 0] - values[..., -1]) > 0:
+        inside = 1 - inside
+    normals = places.across / lengths[..., None]
+    off_edges = lengths * (2 * inside - 1 + 2 / PLACES_ACROSS * between)
     matrices = normals.swapaxes(1, 2) @ normals
-    found = np.linalg.solve(matrices, (normals * off[..., None]).sum(axis=1)[..., None])[..., 0]
+    found = np.linalg.solve(matrices, normals.swapaxes(1, 2) @ off_edges[..., None])[..., 0]
     contrasted = brightest - darkest > CLEAR_OF_NOISE * window.noise
-    return shifts + found, contrasted
+    return found if shifts is None else shifts + found, contrasted
+
+
+def _searched(window: _Window, marks: Marks, places: _Places, off: float, step: float) -> Array | None:
+    """Try shifts of up to `off` px of each mark by itself, `step` px apart: where ink and paper differ most (m, 2).
+
+    None where a step goes further.
+    """
+    furthest = min(off, FURTHEST * marks.spacing / marks.clear * step)
+    if furthest <= step:
+        return None
+    count = int(furthest / step)
+    along = step * np.arange(-count, count + 1)
+    shifts = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    shifts = shifts[np.hypot(shifts[:, 0], shifts[:, 1]) <= furthest]
+    own = len(marks.points)
+    values = window.at(places.samples[:own] + shifts[:, None, None])
+    contrasts = np.einsum("tmk,mk->tm", values, marks.paper[:own] - marks.ink[:own])
+    if marks.either_way and contrasts.max(axis=0).sum() < -contrasts.min(axis=0).sum():
+        contrasts = -contrasts
+    return np.asarray(shifts[contrasts.argmax(axis=0)])
 
 
 def _together(places: _Places, shifts: Array, usable: Mask) -> _Places:
     """Move all places by the homography that most of the marks agree in."""
-    points = places.points[usable]
-    moved = points + shifts[usable, None]
-    across = float(np.linalg.norm(places.ahead - places.edges, axis=-1).min())
-    tolerance = max(across / 3, 1.0)
-    if points.size // 2 < FEWEST:
+    points = places.points[usable].reshape(-1, 2)
+    if len(points) < FEWEST:
         return places
-    homography, _ = cv2.findHomography(points.reshape(-1, 2), moved.reshape(-1, 2), cv2.RANSAC, tolerance)
+    moved = (places.points + shifts[:, None])[usable].reshape(-1, 2)
+    tolerance = max(TOGETHER * float(np.abs(places.across).max()), 1.0)
+    homography, _ = cv2.findHomography(points, moved, cv2.RANSAC, tolerance)
     # OpenCV says None where there is none, whatever the annotation says.
     return places if homography is None else places.mapped(np.asarray(homography))
 
 
-class _Measured(NamedTuple):
-    """Points: `ids` (n,), `pixels` (n, 2) in the window, and `covariances` (n, 2, 2) in px²."""
+class _Looks(NamedTuple):
+    """How marks and places beyond a grid's rim look: the grey values of `paper` and `ink` (m + b,).
 
-    ids: NDArray[np.int64]
+    The part `agreeing` (m + b,) of the samples has the right colour, none where there is no contrast to speak of or not
+    all is in the picture: those are not `whole` (m + b,). Places beyond are `bare` (b,) that have no mark, and no ink
+    in a good part of where one has it.
+    """
+
+    paper: Array
+    ink: Array
+    agreeing: Array
+    whole: Mask
+    bare: Mask
+
+
+def _look(window: _Window, marks: Marks, places: _Places) -> _Looks:
+    values = window.at(places.samples)
+    paper, ink = (np.einsum("mk,mk->m", values, part) for part in (marks.paper, marks.ink))
+    contrasts, own = paper - ink, len(marks.points)
+    sign = -1 if marks.either_way and contrasts[:own].sum() < 0 else 1
+    signs = np.concatenate([np.full(own, sign), np.sign(contrasts[own:])])
+    from_middle = values - ((paper + ink) / 2)[:, None]
+    contrasts = signs * contrasts
+    agreeing = (signs[:, None] * from_middle * marks.colours > CLEARLY * contrasts[:, None]).mean(axis=1)
+    whole = window.holds(places.samples)
+    agreeing[~whole | (contrasts < CLEAR_OF_NOISE * window.noise)] = 0
+    usual = contrasts[:own][agreeing[:own] >= marks.agreeing]
+    if len(usual):
+        agreeing[contrasts < ALIKE * np.median(usual)] = 0
+
+    nearest = marks.nearest[own:]
+    no_ink = sign * (values[own:] - ink[nearest, None]) > NO_INK * contrasts[nearest, None]
+    bare = (
+        whole[own:] & (agreeing[own:] < DISAGREEING) & ((no_ink * marks.ink[own:]).sum(axis=1) > LEAST_BARE)
+    )
+    return _Looks(paper, ink, agreeing, whole, bare)
+
+
+def _is_unshifted(lattice: Lattice, marks: Marks, looks: _Looks, ids: NDArray[np.int64]) -> bool:
+    """Tell whether the points found can be no others of the grid.
+
+    None may be seen beyond its rim. Where its ends are out of the picture, bare places beyond the other ends speak for
+    it, but only if hardly a point is missing in the picture: what covers one may cover those beyond the rim, too.
+    """
+    own = len(marks.points)
+    confirmed = np.bincount(ids, minlength=own) > 0
+    beside = confirmed[marks.nearest[own:]]
+    if np.any(beside & (looks.agreeing[own:] >= marks.agreeing)):
+        return False
+    missing = np.count_nonzero(looks.whole[:own] & ~confirmed)
+    bare = np.flatnonzero(looks.bare & beside & (missing <= MOST_MISSING * len(ids)))
+    return lattice.is_certain(np.flatnonzero(confirmed), bare)
+
+
+class _Measured(NamedTuple):
+    """Marks' points: `pixels` (c, q, 2), `covariances` (c, q, 2, 2) in px², and which of them are `good` (c, q)."""
+
     pixels: Array
     covariances: Array
+    good: Mask
 
 
 def _measured(
     window: _Window, target: Target, marks: Marks, places: _Places, looks: _Looks, chosen: NDArray[np.int64]
 ) -> _Measured:
-    """Measure the points of the chosen marks, without those that do not fit to the picture."""
-    ids = marks.points[chosen].ravel()
+    """Measure the points of the chosen marks (c,); good are those that fit to the picture, and to the others."""
+    near, across = places.points[chosen], places.across[chosen]
     if not len(chosen):
-        return _Measured(ids, np.empty((0, 2)), np.empty((0, 2, 2)))
-    if isinstance(target, CircleGrid | AsymmetricCircleGrid):
-        edges = places.edges[chosen]
-        quarter = edges.shape[1] // 4
-        axes = [(edges[:, turn] - edges[:, turn + 2 * quarter]) / 2 for turn in (0, quarter)]
-        disks = SparseDisks(
-            centres=places.points[chosen, 0],
-            shapes=np.stack(axes, axis=-1),
-            clear=target.spacing / target.disk_diameter,
-            paper=looks.paper[chosen],
-            ink=looks.ink[chosen],
-        )
-        found = sparse_centroids(window.values, disks)
-        contrasts = looks.contrasts[chosen]
-        good = found.good & (found.left < np.maximum(LEFT_OF_NOISE * window.noise, LEFT * contrasts))
-        return _Measured(ids[good], found.pixels[good], found.covariances[good])
-    picture = Picture(np.empty((0, 0), np.uint8), window.values.astype(np.float32), window.noise)
-    if isinstance(target, AprilGrid):
-        tags = measure_tags(picture, target, chosen, places.points[chosen])
-        ids, pixels, covariances = marks.points[chosen][tags.found], tags.pixels, tags.covariances
-        return _Measured(
-            ids.ravel(), pixels[tags.found].reshape(-1, 2), covariances[tags.found].reshape(-1, 2, 2)
-        )
-    points, rough = target_points(target)[ids, :2], places.points[chosen].reshape(-1, 2)
-    view = view_of_plane(points, rough)
-    if view is None:
-        return _Measured(ids[:0], np.empty((0, 2)), np.empty((0, 2, 2)))
-    return _Measured(ids, *measure_corners(picture, view, points, rough, marks.spacing, marks.clear))
+        return _Measured(near, np.empty((*near.shape, 2)), np.empty(near.shape[:2], dtype=bool))
+    reaches = np.hypot(across[..., 0], across[..., 1]).min(axis=1)
+    match target:
+        case CircleGrid() | AsymmetricCircleGrid():
+            paper, ink = looks.paper[chosen], looks.ink[chosen]
+            measured = _disks(window, target, places.edges[chosen], near, paper, ink)
+        case AprilGrid():
+            measured = _tags(window, target, near, chosen)
+        case _:
+            measured = _corners(window, marks, places, looks, chosen)
+    pixels, covariances, good = measured
+    misplaced = np.linalg.norm(pixels - near, axis=2)
+    good &= misplaced < MISPLACED_PX + MISPLACED * marks.spacing / marks.clear * reaches[:, None]
+    return _Measured(pixels, covariances, _agreeing(near, pixels, good))
 
 
-def _in_place(target: Target, marks: Marks, measured: _Measured) -> NDArray[np.int64]:
-    """Choose points, by growing id, that lie as a lens may show a plane."""
-    order = np.argsort(measured.ids)
-    points = target_points(target)[measured.ids, :2]
-    for _ in range(3):
-        view = view_of_plane(points[order], measured.pixels[order])
-        if view is None:
-            return order[:0]
-        bent = bent_view(view, points[order], measured.pixels[order])
-        misfits = np.linalg.norm(bent.project(points[order]) - measured.pixels[order], axis=1)
-        right = misfits < MISPLACED_PX + MISPLACED * marks.spacing * view.scales(points[order])
-        if right.all():
+def _agreeing(near: Array, pixels: Array, good: Mask) -> Mask:
+    """Choose the good points that are off their places (c, q, 2) as their neighbours are, and their own mark's."""
+    off = pixels - near
+    own = np.linalg.norm(off - off.mean(axis=1, keepdims=True), axis=2).max(axis=1, keepdims=True)
+    for _ in range(2):
+        if not good.any():
             break
-        order = order[right]
-    return order
+        bend = smooth(near[good], off[good], OFF_DEGREE)
+        apart = np.maximum(np.linalg.norm(off - bend.at(near), axis=2), own)
+        good = good & (apart < np.clip(OFF_TIMES * np.median(apart[good]), *OFF_PX))
+    return good
 
 
-def _is_certain(
-    window: _Window, marks: Marks, lattice: Lattice, places: _Places, usual: float, ids: NDArray[np.int64]
-) -> bool:
-    """Tell whether the points found can be no others of the grid: none is seen beyond its rim, and enough of it is."""
-    seen = np.zeros(len(marks.middles), dtype=bool)
-    seen[ids] = True
-    colours = marks.colours[lattice.nearest]
-    agreeing = [
-        np.where(look.contrasts > ALIKE * usual, look.agreeing, 0.0)
-        for look in (_look(window, places.beyond, sign * colours) for sign in (1, -1))
-    ]
-    alike = np.maximum(*agreeing)
-    beside = seen[lattice.nearest] & window.holds(places.beyond)
-    if np.any(beside & (alike > AGREEING)):
-        return False
-    return lattice.is_certain(seen, beside & (alike < DISAGREEING))
+def _disks(
+    window: _Window,
+    target: CircleGrid | AsymmetricCircleGrid,
+    edges: Array,
+    near: Array,
+    paper: Array,
+    ink: Array,
+) -> _Measured:
+    quarter = edges.shape[1] // 4
+    disks = SparseDisks(
+        centres=near[:, 0],
+        shapes=(edges[:, [0, quarter]] - edges[:, [2 * quarter, 3 * quarter]]).swapaxes(1, 2) / 2,
+        clear=target.spacing / target.disk_diameter,
+        paper=paper,
+        ink=ink,
+    )
+    found = sparse_centroids(window.values, disks)
+    good = found.good & (found.left < np.maximum(LEFT_OF_NOISE * window.noise, LEFT * np.abs(paper - ink)))
+    return _Measured(found.pixels[:, None], found.covariances[:, None], good[:, None])
+
+
+def _corners(
+    window: _Window, marks: Marks, places: _Places, looks: _Looks, chosen: NDArray[np.int64]
+) -> _Measured:
+    points, near = marks.middles[chosen], places.points[chosen, 0]
+    crossings = crossings_of(places.view, points, near, marks.spacing, marks.clear)
+    found = sparse_corners(window.values, window.noise, crossings, np.maximum(looks.paper, looks.ink)[chosen])
+    good = found.good & (
+        found.left < np.maximum(LEFT_OF_NOISE * window.noise, 2 * LEFT * np.abs(found.steps))
+    )
+    return _Measured(found.pixels[:, None], found.covariances[:, None], good[:, None])
+
+
+def _tags(window: _Window, target: AprilGrid, near: Array, chosen: NDArray[np.int64]) -> _Measured:
+    picture = Picture(np.empty((0, 0), np.uint8), window.values.astype(np.float32), window.noise)
+    found = measure_tags(picture, target, chosen, near)
+    good = np.repeat(found.found[:, None], near.shape[1], axis=1)
+    return _Measured(found.pixels, found.covariances, good)

@@ -1,12 +1,15 @@
 """The API looks for the target in the live picture, and says how good the picture is."""
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
+import numpy as np
 import pytest
 
 from calib import detection
+from calib.detection import inspection
 from daemon import live_detection
 from daemon.api import create_app
 from daemon.service import Service, running_service
@@ -46,12 +49,32 @@ async def test_many_who_ask_share_one_look(service: Service, monkeypatch: pytest
 
     looks = []
 
-    def look(*given: object) -> detection.Inspection:
+    def look(*given: object, **more: object) -> detection.Inspection:
         looks.append(given)
-        return detection.inspect(*given)  # type: ignore[arg-type]
+        return detection.inspect(*given, **more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(service.rig, "frame", same_frame)
     monkeypatch.setattr(live_detection, "inspect", look)
     sightings = await asyncio.gather(*(service.sightings.newest() for _ in range(5)))
     assert len(looks) == 1
     assert all(sighting is sightings[0] for sighting in sightings)
+
+
+async def test_from_look_to_look_the_target_is_tracked(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = (await service.sightings.newest()).inspection.detection
+    assert first is not None
+    monkeypatch.setattr(inspection, "detect", lambda *_: pytest.fail("the whole picture was searched"))
+    sighting = await service.sightings.newest()
+    assert sighting.inspection.detection is not None
+    np.testing.assert_allclose(sighting.inspection.detection.pixels, first.pixels, atol=0.2)
+
+
+async def test_where_tracking_ends_the_whole_picture_is_searched(service: Service) -> None:
+    frame, target = await service.rig.frame(), service.profile.target
+    seen = detection.detect(frame.image, target)
+    elsewhere = replace(seen, pixels=seen.pixels * 0.5)
+    again = detection.inspect(frame.image, target, before=elsewhere).detection
+    assert again is not None
+    np.testing.assert_array_equal(again.pixels, seen.pixels)
