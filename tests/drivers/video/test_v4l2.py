@@ -1,6 +1,7 @@
 """What V4L2 cameras were seen to do behind OpenCV, each as a trap that the driver does not fall into."""
 
 import asyncio
+import os
 import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -238,6 +239,22 @@ async def test_an_opening_that_is_cancelled_lets_the_device_go() -> None:
     with pytest.raises(asyncio.CancelledError):
         await opening
     assert rig.capture.released == rig.node.closed == 1
+
+
+async def test_opencv_is_kept_from_waiting_ten_seconds_for_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "")
+    monkeypatch.delenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT")
+    seen: list[str | None] = []
+
+    def opened(_device: str, _backend: int) -> FakeCapture:
+        seen.append(os.environ.get("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT"))
+        return FakeCapture()
+
+    monkeypatch.setattr(cv2, "VideoCapture", opened)
+    source = V4l2Source(SPEC, V4l2Options(device="/dev/null"), lambda _camera, _device: FakeNode(WEBCAM))
+    source.open()
+    source.close()
+    assert seen == ["1"]
 
 
 # What is set is read back.
