@@ -1,7 +1,7 @@
 """The contract of a camera: frames with a sequence number and the time at which their exposure began."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NoReturn, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,4 +55,13 @@ class CameraSource(Protocol):
 
     async def close(self) -> None:
         """Stop the stream and let the device go."""
+        ...
+
+
+@runtime_checkable
+class Watchful(Protocol):
+    """A camera that notices by itself when it is lost. Of others it shows when the next frame is asked for."""
+
+    async def watch(self) -> NoReturn:
+        """Wait until the camera is lost, and raise DeviceLostError."""
         ...

@@ -2,9 +2,10 @@
 
 import asyncio
 from collections.abc import Callable
+from typing import Any
 
 from daemon.rig.device_owner import DeviceOwner
-from drivers.camera import CameraSource, Frame
+from drivers.camera import CameraSource, Frame, Watchful
 from drivers.errors import DeviceLostError, DeviceTimeoutError
 
 
@@ -50,7 +51,17 @@ class CameraOwner(DeviceOwner):
     async def _serve(self) -> None:
         assert self._gone is not None
         self._publish()
-        await self._gone
+        if not isinstance(self._camera, Watchful):
+            await self._gone
+            return
+        watch = asyncio.create_task(self._camera.watch())
+        waited: list[asyncio.Future[Any]] = [self._gone, watch]
+        try:
+            await asyncio.wait(waited, return_when=asyncio.FIRST_COMPLETED)
+            next(one for one in waited if one.done()).result()
+        finally:
+            watch.cancel()
+            await asyncio.gather(watch, return_exceptions=True)
 
     async def _close(self) -> None:
         if self._gone is not None:

@@ -1,8 +1,10 @@
 """A video camera as activecam wants it, whatever it reads from."""
 
+import asyncio
 import time
 from collections.abc import Sequence
 from itertools import count
+from typing import Final, NoReturn
 
 from drivers.camera import CameraSpec, Frame
 from drivers.cancellation import finish
@@ -10,6 +12,9 @@ from drivers.clock import Clock, ScaledClock
 from drivers.errors import DeviceLostError, OptionsError
 from drivers.video.grabber import Grabber
 from drivers.video.source import Source
+
+_WATCH: Final = 0.25
+"""Seconds between two looks at whether the camera is still there."""
 
 
 class VideoCamera:
@@ -60,6 +65,12 @@ class VideoCamera:
             if newest is not None and (after is None or newest.timestamp >= after):
                 return newest
             await grabber.news()
+
+    async def watch(self) -> NoReturn:
+        """Wait until the camera is lost; see `drivers.camera.Watchful`."""
+        while True:
+            self._require_open().require_alive()
+            await asyncio.sleep(_WATCH)
 
     async def close(self) -> None:
         """Stop the stream and let the device go."""

@@ -49,6 +49,16 @@ def devices(profile: Profile, simulated: Devices, emulator: StreamEmulator) -> D
     return dataclasses.replace(simulated, camera=StreamCamera.create(profile.camera.spec, options, context))
 
 
+async def test_a_camera_that_nobody_looks_through_is_noticed_to_be_gone(
+    service: Service, emulator: StreamEmulator
+) -> None:
+    emulator.unplug()
+    snapshot = await until(service.rig, lambda snapshot: len(snapshot.problems) > 0)
+    assert "camera 'main' is lost" in snapshot.problems[0]
+    emulator.repair()
+    await until(service.rig, lambda snapshot: snapshot.problems == [])
+
+
 @pytest.mark.parametrize(
     ("phase", "fault"),
     [
