@@ -13,7 +13,6 @@ A stream carries no time that OpenCV would tell. A frame's exposure is taken to 
 """
 
 import logging
-import os
 import time
 from collections.abc import Callable, Sequence
 from itertools import chain
@@ -31,8 +30,6 @@ from drivers.video.source import Capture, Picture
 
 logger = logging.getLogger(__name__)
 
-_FFMPEG: Final = "rtsp_transport;tcp|fflags;nobuffer"
-"""No reordering buffers, and none of UDP's half frames."""
 _BLOCK: Final = 8
 """Rows of a JPEG that are decoded together."""
 
@@ -49,7 +46,6 @@ class StreamCamera(VideoCamera):
 
 
 def _open_capture(url: str, timeout: float) -> Capture:
-    os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", _FFMPEG)
     limit = round(1000 * timeout)
     # Each further thread of the decoder would hold back one frame.
     settings = {
