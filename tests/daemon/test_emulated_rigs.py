@@ -29,7 +29,8 @@ POSITION, ROTATION = 3e-4, 5e-4
 # Fewer and smaller pictures than the shipped profile's, since they are rendered and measured while the axes move.
 SMALLER = {
     "grbl-table": (
-        ("width = 960\nheight = 720", "width = 640\nheight = 480"),
+        ("width = 960", "width = 640"),
+        ("height = 720", "height = 480"),
         (
             'fx = "905 px"\nfy = "903 px"\ncx = "487 px"\ncy = "352 px"',
             'fx = "603 px"\nfy = "602 px"\ncx = "324 px"\ncy = "235 px"',
