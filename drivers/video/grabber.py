@@ -15,7 +15,7 @@ FIRST_PAUSE: Final = 0.005
 LONGEST_PAUSE: Final = 0.2
 """Seconds between two reads that bring nothing: a device that is gone answers at once, and for ever."""
 JOIN_LIMIT: Final = 15.0
-"""Seconds that a read may hold up the closing: more than any library's own time-out."""
+"""Seconds, beyond the time-out that libraries are given, for which a read may hold up the closing."""
 
 
 class Grabber:
@@ -63,10 +63,11 @@ class Grabber:
     async def stop(self) -> None:
         """Return when the thread has let the source go."""
         self._stopping.set()
-        await asyncio.to_thread(self._thread.join, JOIN_LIMIT)
+        limit = self._timeout + JOIN_LIMIT
+        await asyncio.to_thread(self._thread.join, limit)
         if self._thread.is_alive():
             raise DeviceTimeoutError(
-                f"camera '{self._name}' has not let go for {JOIN_LIMIT:g} s: unplug it, or restart the program"
+                f"camera '{self._name}' has not let go for {limit:g} s: unplug it, or restart the program"
             )
 
     def require_alive(self) -> None:

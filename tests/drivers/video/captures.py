@@ -144,6 +144,7 @@ class FakeNode:
         self.failing: set[str] = set()
         self.order: list[str] = []
         self.closed = 0
+        self.let_go = threading.Event()
 
     def get(self, control: Control) -> int:
         if control.name in self.failing:
@@ -159,6 +160,7 @@ class FakeNode:
 
     def close(self) -> None:
         self.closed += 1
+        self.let_go.set()
 
 
 def control(id_: int, name: str, value: int, low: int = 0, high: int = 255) -> dict[str, tuple[Control, int]]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import threading
 import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -15,7 +16,8 @@ from drivers.camera import CameraSpec
 from drivers.clock import ScaledClock, SystemClock
 from drivers.contract import CameraBench, CameraContract
 from drivers.driver import Cautious, DriverContext
-from drivers.errors import DeviceLostError, OptionsError
+from drivers.errors import DeviceLostError, DeviceTimeoutError, OptionsError
+from drivers.video import grabber
 from drivers.video.camera import VideoCamera
 from drivers.video.options import V4l2Options
 from drivers.video.v4l2 import V4l2Camera, V4l2Source
@@ -228,6 +230,24 @@ async def test_closing_does_not_wait_for_a_frame_that_never_comes() -> None:
     async with rig.open():
         rig.capture.mute = True
     assert rig.capture.released == rig.node.closed == 1
+
+
+async def test_a_library_that_does_not_return_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grabber, "JOIN_LIMIT", 0.1)
+    rig = Rig(timeout="200 ms")
+    await rig.camera.open()
+    returns = threading.Event()
+
+    def hang() -> tuple[bool, None]:
+        returns.wait(60)
+        return False, None
+
+    monkeypatch.setattr(rig.capture, "read", hang)
+    await asyncio.sleep(0.05)
+    with pytest.raises(DeviceTimeoutError, match=r"camera 'eye' has not let go for 0.3 s: unplug it"):
+        await rig.camera.close()
+    returns.set()
+    assert await asyncio.to_thread(rig.node.let_go.wait, 60)
 
 
 async def test_an_opening_that_is_cancelled_lets_the_device_go() -> None:
