@@ -34,7 +34,7 @@ LOCKED: Final = 2.0
 def run(*, quick: bool) -> dict[str, float]:
     """Print the table; return the main figures."""
     cv2.setNumThreads(1)
-    pairs, frames = (1, 3) if quick else (15, 40)
+    pairs, frames = (1, 3) if quick else (9, 12)
     say(f"{pairs} pairs, {frames} pictures of a moving plate; {threads()}")
     rows = table(
         "Live rates", "target", "1280 x 960: searched /s", "tracked /s", "1920 x 1080: detect / track", "(each, ms)",

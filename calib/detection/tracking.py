@@ -77,7 +77,7 @@ def track(image: NDArray[np.generic], target: Target, predicted: Prediction) -> 
     so much must be seen that it can't be shifted: points at both ends both ways, or at one end, with none beyond.
     A target that looks the same after a turn is read as predicted.
 
-    It takes no more than a tenth of the time of `detect`, and measures on fewer pixels, so that points scatter more.
+    It takes a part of the time of `detect`, as it measures on fewer pixels, and points scatter more.
     A prediction that is off by more than it says, or by half the distance between neighbouring points, is as good as
     none.
 
