@@ -8,6 +8,7 @@ an empty endpoint or of the paper from the same run, and what is timed is timed 
     solve_time, solve_growth, detection_time
     live_rate      with the pictures of the next
     detection_accuracy   with its pictures (rendered_plates), their bound (picture_bound), and OpenCV (peer_detectors)
+    stop_time      over the emulators of drivers.emulators
     pose_rate      with its servers (pose_server, bare_server; server_process) and its client (http_client)
     true_rig, random_rigs   rigs with known truth, and sessions of theirs with noise
     efficiency     with the bound that it judges by (cramer_rao)

@@ -17,6 +17,7 @@ NAMES: Final = (
     "detection_accuracy",
     "live_rate",
     "pose_rate",
+    "stop_time",
     "efficiency",
     "uncertainty",
     "pictures",

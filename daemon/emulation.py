@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import tomlkit
 
@@ -13,6 +13,9 @@ from drivers.driver import DriverContext
 from drivers.emulators.emulator import Emulator
 from drivers.emulators.registry import camera_emulator, controller_emulator
 
+if TYPE_CHECKING:
+    from drivers.simulated.world import SimulatedWorld
+
 CAMERA: Final = "camera"
 """What the camera is called where devices are named; controllers go by their own names."""
 
@@ -21,6 +24,8 @@ CAMERA: Final = "camera"
 class EmulatedRig:
     """Emulators that run, and where they are."""
 
+    world: "SimulatedWorld"
+    """What they act in, and look at."""
     emulators: Mapping[str, Emulator]
     controllers: Mapping[str, Mapping[str, Any]]
     """Keys of each `[controllers.NAME]` by which its driver finds the emulator."""
@@ -60,7 +65,7 @@ async def emulated(profile: Profile) -> AsyncIterator[EmulatedRig]:
             running.push_async_callback(emulator.close)
             places[name] = await emulator.start()
         camera = places.pop(CAMERA)
-        yield EmulatedRig(emulators, places, camera)
+        yield EmulatedRig(world, emulators, places, camera)
 
 
 def _make(profile: Profile, context: DriverContext) -> dict[str, Emulator]:
