@@ -70,7 +70,7 @@ class PtyPort:
     def send(self, data: bytes) -> None:
         """Send what somebody may read; lost where nobody has the port open, or reads."""
         if self._master is not None and self._listening:
-            with contextlib.suppress(BlockingIOError):
+            with contextlib.suppress(OSError):
                 os.write(self._master, data)
 
     def _wait_for_opening(self) -> None:

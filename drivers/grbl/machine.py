@@ -147,10 +147,12 @@ class Machine:
 
     async def halt(self) -> None:
         """Stop whatever moves: a jog at once, homing by a reset, what others have started by a hold and a reset."""
-        if self.homing is not None:
+        if self.homing is not None and not self.homing.done():
             self._resetting = True
             self._link.halt(RESET)
             await asyncio.wait([self.homing])
+            await self._link.status()  # which is answered after all that the reset brings about
+            self._resetting = False
             return
         self._link.halt(JOG_CANCEL)
         # A jog that is being taken in is not yet one that can be cancelled: once it is, it can.

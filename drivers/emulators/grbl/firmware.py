@@ -99,6 +99,8 @@ class Firmware:
             self._stuck = number
             self._say("[MSG:Reset to continue]")
             self._ok_owed = number == 2
+            for task in self._tasks:
+                task.cancel()  # whatever line is being carried out, it goes no further
 
     @property
     def state(self) -> str:
