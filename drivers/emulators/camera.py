@@ -23,6 +23,8 @@ QUALITY: Final = 95
 """Of the JPEG pictures: edges stay where they are to some thousandths of a pixel."""
 LATENCY: Final = "2 s"
 """What a profile is to state where it states none: a picture is rendered after its exposure, which takes a while."""
+INSTANTS: Final = 3
+"""Of how many a blurred picture is made: enough to be useless, and rendered in time."""
 _BOUNDARY: Final = b"frame"
 _HEAD: Final = (
     b"HTTP/1.0 200 OK\r\nCache-Control: no-store\r\nConnection: close\r\n"
@@ -49,7 +51,7 @@ class StreamEmulator:
         self.port = 0
         self._keys = keys
         self._world = world
-        self._exposure = Exposure(world, spec.width, spec.height)
+        self._exposure = Exposure(world, spec.width, spec.height, INSTANTS)
         picture = world.options.camera.picture
         self._period, self._duration = 1.0 / picture.frame_rate, picture.exposure
         self._shot: Shot | None = None

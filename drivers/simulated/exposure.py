@@ -22,8 +22,10 @@ _INSTANTS = 8
 class Exposure:
     """Exposes pictures of a world on a sensor of width x height pixels."""
 
-    def __init__(self, world: SimulatedWorld, width: int, height: int) -> None:
+    def __init__(self, world: SimulatedWorld, width: int, height: int, instants: int = _INSTANTS) -> None:
+        """`instants`: of how many a blurred picture is made at most."""
         self._world = world
+        self._instants = instants
         self._renderer = Renderer(world.plate, world.lens, width, height)
         self._sensor = Sensor(world.options.camera.picture, width, height)
         self._still: tuple[bytes, Grey] | None = None
@@ -41,7 +43,7 @@ class Exposure:
         travel = float(np.max(np.sum(steps, axis=0), initial=0.0, where=np.isfinite(steps).all(axis=0)))
         if travel < _VISIBLE:
             return [path[1]]
-        count = min(_INSTANTS, 2 + math.ceil(travel / _STEP))
+        count = min(self._instants, 2 + math.ceil(travel / _STEP))
         instants = begins + (np.arange(count) + 0.5) / count * duration
         return [self._world.world_from_camera_at(float(t)) for t in instants]
 

@@ -5,8 +5,9 @@ A stream carries no time that OpenCV would tell. A frame's exposure is taken to 
 
 * frames are read without pause, so that none grows old on this side;
 * those that came while the stream was being opened are read and dropped;
-* a pause of more than half the latency is followed by frames that much late, so that the stream is opened anew.
-  With a latency of twice what was measured the other half is what frames take at other times;
+* a pause of more than half the latency may be followed by frames that much late, so that the stream is opened anew,
+  which leaves what has queued up on the way behind. With a latency of twice what was measured the other half is what
+  frames take at other times. After a pause of more than all of it the stream counts as lost;
 * a picture that is equal to the one before it in every pixel comes from a server that has no new one;
 * in what a JPEG lacks that was cut off, the decoder leaves the picture before it: one whose lowest rows are equal to
   those before is torn. Other codecs repeat what stands still, so that there only whole pictures are compared.
@@ -104,6 +105,11 @@ class StreamSource:
         if not read or image is None:
             raise DeviceLostError(f"camera '{self._spec.name}': {self._options.url} has ended or broken off")
         pause, self._arrived = arrived - self._arrived, arrived
+        if pause > self._options.latency:
+            raise DeviceLostError(
+                f"camera '{self._spec.name}' sent nothing for {pause:.2f} s, and the profile states a latency of "
+                f"{self._options.latency:g} s at most: see what holds it up, or state a longer one"
+            )
         if pause > 0.5 * self._options.latency:
             self._open_anew(pause)
             return None

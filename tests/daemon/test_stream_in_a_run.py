@@ -47,7 +47,7 @@ def devices(
     request: pytest.FixtureRequest, profile: Profile, simulated: Devices, emulator: StreamEmulator
 ) -> Devices:
     patience = getattr(request, "param", "2 s")
-    options = StreamOptions(url=emulator.url, latency="1 s", exposure="10 ms", timeout=patience)
+    options = StreamOptions(url=emulator.url, latency="1500 ms", exposure="10 ms", timeout=patience)
     context = DriverContext(simulated.clock)
     return dataclasses.replace(simulated, camera=StreamCamera.create(profile.camera.spec, options, context))
 
@@ -105,7 +105,7 @@ async def test_a_run_through_a_stream_that_falls_behind_finds_the_truth(
     run = await service.runs.start("anna", "by the network")
     async for event in service.runs.events(run.id):
         if event.type == "joint" and event.joint == "pan":
-            emulator.delay(0.7)
+            emulator.delay(1.0)
     ended = await service.runs.get(run.id)
     assert ended.error is None
     world = service.rig.world
@@ -113,5 +113,6 @@ async def test_a_run_through_a_stream_that_falls_behind_finds_the_truth(
     calibration = load_calibration(service.store.session_folder(ended) / "calibration.json")
     for readings in ([10.0, -8.0], [50.0, 0.0], [95.0, 11.0]):
         found, true = calibration.world_from_camera(readings), world.world_from_camera(readings)
-        assert np.linalg.norm(found[:3, 3] - true[:3, 3]) < 0.3e-3
-        assert np.linalg.norm(found[:3, :3] - true[:3, :3]) < 0.5e-3
+        # What ten small pictures tell; one of an earlier position would be off by tens of millimetres.
+        assert np.linalg.norm(found[:3, 3] - true[:3, 3]) < 2e-3
+        assert np.linalg.norm(found[:3, :3] - true[:3, :3]) < 2e-3

@@ -53,14 +53,14 @@ class TestStreamContract(CameraContract):
 
     def bench(self) -> CameraBench:
         return CameraBench(
-            stream(self.emulator.url, latency="1 s"), SystemClock(), unplug=self.emulator.unplug
+            stream(self.emulator.url, latency="1500 ms"), SystemClock(), unplug=self.emulator.unplug
         )
 
 
 async def test_a_frame_shows_where_the_camera_was_when_it_was_asked_for_and_not_before() -> None:
     running = emulator(picture={"noise": 1.0, "exposure": "5 ms"})
     await running.start()
-    source = stream(running.url, latency="1 s")
+    source = stream(running.url, latency="1500 ms")
     await source.open()
     world = running._world
     _, slide = world.shaft("slide")
@@ -129,6 +129,17 @@ async def test_a_stream_that_fell_behind_is_opened_anew(camera: StreamEmulator) 
     frame = await source.frame(after=asked)
     assert frame.timestamp >= asked
     assert connections.isdisjoint(camera._clients)
+    await source.close()
+
+
+async def test_a_stream_that_may_be_later_than_the_profile_says_is_lost(camera: StreamEmulator) -> None:
+    source = stream(camera.url, latency="400 ms", timeout="20 s")
+    await source.open()
+    camera.delay(1.5)
+    with pytest.raises(
+        DeviceLostError, match=r"sent nothing for .* s, and the profile states a latency of 0.4 s"
+    ):
+        await source.frame(after=time.monotonic() + 30)
     await source.close()
 
 
