@@ -52,7 +52,10 @@ class Rig:
 
     async def start(self) -> Cia402Controller:
         """Switch the drives on, and return a controller for them that is not open yet."""
-        found = await self.emulator.start()
+        return self.connect(**await self.emulator.start())
+
+    def connect(self, **found: Any) -> Cia402Controller:
+        """Return a controller that finds the drives by these keys."""
         options = Cia402Options.model_validate(self._options | found)
         self.controller = Cia402Controller.create(self._specs, options, self._axes, DriverContext(self.clock))
         return self.controller
