@@ -35,7 +35,7 @@ class Cia402Controller:
     ) -> None:
         self._options = options
         self._clock = clock
-        self._link = Link(options)
+        self._link = Link(options, [axis_options[name].node for name in specs])
         self._sampler = Sampler(self._link, clock, options.silence / 4)
         self._drives = {
             name: Drive(name, axis_options[name].node, self._link, self._sampler, clock) for name in specs

@@ -4,9 +4,10 @@ import asyncio
 import contextlib
 import errno
 import logging
+import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, TypeVar
 
@@ -23,6 +24,8 @@ _PATIENCE: Final = 0.1
 """Seconds that a full transmit queue is given to drain."""
 _HEARTBEAT: Final = 0x700
 _OPERATIONAL: Final = b"\x05"
+_NODE: Final = 0x07F
+"""The part of an identifier that tells the node."""
 _BUS_OFF: Final = 0x40
 """Of an error frame's identifier (linux/can/error.h): the controller has left the bus."""
 
@@ -34,8 +37,9 @@ logging.getLogger("canopen").setLevel(logging.CRITICAL)
 class Link:
     """A bus that is open or lost. What blocks is done by `ask`, in one thread: SDOs of two would mix."""
 
-    def __init__(self, options: Cia402Options) -> None:
+    def __init__(self, options: Cia402Options, nodes: Iterable[int]) -> None:
         self.options = options
+        self._nodes = tuple(nodes)
         self.name = f"the CAN bus '{options.channel}' ({options.interface})"
         self._network: Network | None = None
         self._asking: ThreadPoolExecutor | None = None
@@ -56,7 +60,9 @@ class Link:
         self._stopping = ThreadPoolExecutor(1, "cia402-stop")
         network = Network(self.options.silence)
         try:
-            await self._in_thread(self._asking, lambda: network.open(_bus_arguments(self.options)))
+            await self._in_thread(
+                self._asking, lambda: network.open(_bus_arguments(self.options, self._nodes))
+            )
         except BaseException:
             self._network = network
             await self.close()
@@ -180,9 +186,16 @@ class _Watch(can.Listener):
         pass
 
 
-def _bus_arguments(options: Cia402Options) -> dict[str, Any]:
+def _bus_arguments(options: Cia402Options, nodes: Iterable[int]) -> dict[str, Any]:
+    """Return what `can.Bus` is called with. Raises OSError where there is no such interface."""
     arguments: dict[str, Any] = {"interface": options.interface, "channel": options.channel}
     match options.interface:
+        case "socketcan":
+            socket.if_nametoindex(options.channel)  # python-can leaks a socket where there is none
+            # What others say on the bus is kept out of the queue, which a slow reader would let overflow.
+            arguments["can_filters"] = [
+                {"can_id": node, "can_mask": _NODE, "extended": False} for node in nodes
+            ]
         case "slcan":
             arguments |= {"bitrate": options.bitrate, "sleep_after_open": options.adapter_delay}
         case "udp_multicast":

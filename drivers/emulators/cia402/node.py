@@ -78,8 +78,8 @@ _BOOT_UP, _STOPPED, _OPERATIONAL, _PRE_OPERATIONAL = 0, 4, 5, 127
 _NMT: Final = {1: _OPERATIONAL, 2: _STOPPED, 128: _PRE_OPERATIONAL}
 _RESETS: Final = frozenset({129, 130})
 _PDO_INVALID: Final = 1 << 31
-_PAUSE: Final = 0.1
-"""Seconds between two ticks that are nothing unusual."""
+_SECOND_LOOK: Final = 0.1
+"""Seconds from the first look that finds a heartbeat missing to the one that counts."""
 _HEARTBEAT_LOST: Final = 0x8130
 
 
@@ -113,7 +113,7 @@ class Node:
         self._state = _PRE_OPERATIONAL
         self._next_heartbeat = 0.0
         self._guarded_at: float | None = None
-        self._ticked_at = clock.now()
+        self._missed_at: float | None = None
 
     def reset(self) -> None:
         """Come up anew, as after the power was off, and say so."""
@@ -152,9 +152,7 @@ class Node:
         if period and self.has_heartbeat and now >= self._next_heartbeat:
             self._next_heartbeat = now + period
             self._say(0x700 + self.id, bytes([self._state]))
-        self._excuse(now)
-        patience = (self._number(0x1016, 1) & 0xFFFF) / 1000
-        if patience and self._guarded_at is not None and now - self._guarded_at > patience:
+        if self._hears_nobody(now):
             self._guarded_at = None
             if self._number(0x6007, 0) == 1:
                 self.servo.fail(_HEARTBEAT_LOST)
@@ -183,12 +181,17 @@ class Node:
         elif index == 0x6060:
             self.servo.enter(variable.decode_raw(data))
 
-    def _excuse(self, now: float) -> None:
-        """Take no time for silence in which the emulator itself was held up: its frames are still to be heard."""
-        held_up = now - self._ticked_at - _PAUSE
-        self._ticked_at = now
-        if self._guarded_at is not None and held_up > 0:
-            self._guarded_at += held_up + _PAUSE
+    def _hears_nobody(self, now: float) -> bool:
+        """Return whether the heartbeat that is to be watched is gone, at the second look that finds it so.
+
+        An emulator that was held up has its frames still to hear.
+        """
+        patience = (self._number(0x1016, 1) & 0xFFFF) / 1000
+        if not patience or self._guarded_at is None or now - self._guarded_at <= patience:
+            self._missed_at = None
+        elif self._missed_at is None:
+            self._missed_at = now
+        return self._missed_at is not None and now - self._missed_at > _SECOND_LOOK
 
     def _live(self, index: int) -> int | None:
         match index:

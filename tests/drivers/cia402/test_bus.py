@@ -159,7 +159,7 @@ async def test_an_object_that_the_drive_refuses_is_named() -> None:
 
 
 async def test_an_interface_that_is_not_there_is_a_loss_in_words() -> None:
-    link = Link(Cia402Options(interface="socketcan", channel="nocan7"))
+    link = Link(Cia402Options(interface="socketcan", channel="nocan7"), [1])
     with pytest.raises(DeviceLostError, match=r"the CAN bus 'nocan7' \(socketcan\): .*; check its interface"):
         await link.open()
     with pytest.raises(DeviceLostError, match="is not open: open it first"):
@@ -167,7 +167,7 @@ async def test_an_interface_that_is_not_there_is_a_loss_in_words() -> None:
 
 
 async def test_a_serial_adapter_that_is_not_there_is_a_loss_in_words() -> None:
-    link = Link(Cia402Options(interface="slcan", channel="/dev/nothing", bitrate=500000))
+    link = Link(Cia402Options(interface="slcan", channel="/dev/nothing", bitrate=500000), [1])
     with pytest.raises(DeviceLostError, match=r"the CAN bus '/dev/nothing' \(slcan\)"):
         await link.open()
 

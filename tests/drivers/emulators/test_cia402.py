@@ -243,7 +243,7 @@ def test_a_drive_that_hears_no_heartbeat_goes_into_fault(enabled: Bench) -> None
     enabled.node.receive(0x77F, b"\x05")
     enabled.after(0.15)
     assert enabled.state == 0x27
-    enabled.after(0.1)
+    enabled.after(0.2)
     assert (enabled.state & 0x4F, enabled.number(0x603F)) == (0x08, 0x8130 - 0x10000)
 
 
@@ -252,9 +252,11 @@ def test_an_emulator_that_was_held_up_does_not_lay_it_to_others(enabled: Bench) 
     enabled.write(0x1016, 1, 127 << 16 | 200, 4)
     enabled.node.receive(0x77F, b"\x05")
     enabled.clock.time += 30.0
+    enabled.after(0.05)
+    enabled.node.receive(0x77F, b"\x05")  # it had been waiting to be heard
     enabled.after(0.15)
     assert enabled.state == 0x27
-    enabled.after(0.1)
+    enabled.after(0.3)
     assert enabled.state & 0x4F == 0x08
 
 
