@@ -18,6 +18,8 @@ EEPROM_TIME: Final = 0.02
 """Seconds that a setting takes to be written, in which nothing is received."""
 WCO_IDLE: Final = 10
 WCO_BUSY: Final = 30
+RESTARTING: Final = frozenset({3, 6, 7, 8, 9})
+"""Alarms with which it begins anew."""
 BANNER: Final = "\r\nGrbl 1.1h ['$' for help]\r\n"
 
 
@@ -91,7 +93,7 @@ class Firmware:
         self._arrived.set()
 
     def alarm(self, number: int) -> None:
-        """Go into alarm by itself, as at a limit switch; 1 and 2 make it deaf."""
+        """Go into alarm by itself, as at a limit switch; 1 and 2 make it deaf, and most others restart it."""
         self.machine.cut()
         self._alarm = True
         self._say(f"ALARM:{number}")
@@ -101,6 +103,8 @@ class Firmware:
             self._ok_owed = number == 2
             for task in self._tasks:
                 task.cancel()  # whatever line is being carried out, it goes no further
+        elif number in RESTARTING:
+            self._restart(number in {6, 8, 9})
 
     @property
     def state(self) -> str:
