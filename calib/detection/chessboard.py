@@ -40,9 +40,9 @@ def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
     view = view_of_plane(points, rough)
     if view is None:
         raise not_found
-    pixels, covariances = measure_corners(picture, view, points, rough, target.pitch, target.pitch / 2)
-    reading = upright(target, pixels)
-    return Detection(np.arange(len(pixels)), pixels[reading], covariances[reading], disk=None)
+    corners = measure_corners(picture, view, points, rough, target.pitch, target.pitch / 2)
+    reading = upright(target, corners.pixels)
+    return Detection(np.arange(len(points)), corners.pixels[reading], corners.covariances[reading], disk=None)
 
 
 def _found(grey: NDArray[np.uint8], target: Chessboard) -> Iterator[NDArray[np.float64]]:

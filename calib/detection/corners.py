@@ -30,6 +30,9 @@ SOFTENING = 1.0  # px, standard deviation
 SHARED_NOISE = 4 * pi * SOFTENING**2  # pixels of a softened picture that have one noise
 BENDS_DEGREE, LIGHTS_DEGREE = 5, 2
 LEAST_SLOPE = 1e-6  # of the light a px
+MAY_MOVE = 4.0  # px from where a corner was thought to be; further off is another
+MUCH_BLURRED = 3.0  # times what most are; what is more so is no crossing of edges
+MISFIT = 0.3  # of the contrast; more and something else is in sight
 UNMODELLED_VARIANCE = 0.001**2  # px²; the shape of the pixels and of the lens' blur
 UNMEASURED_VARIANCE = 0.5**2  # px²; where the drawing does not fit
 
@@ -61,49 +64,63 @@ class Crossings:
         return heights[0], heights[1]
 
 
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Measured `pixels` (n, 2), their `covariances` (n, 2, 2) in px², and which of them are `found` (n,).
+
+    Those that are not are as they were given, with a covariance as if that were a guess.
+    """
+
+    pixels: Floats
+    covariances: Floats
+    found: NDArray[np.bool_]
+
+
 def measure_corners(
     picture: Picture, view: PlaneView, points: Floats, pixels: Floats, pitch: float, clear: float
-) -> tuple[Floats, Floats]:
+) -> Corners:
     """Measure the corners at points (n, 2) of a print, in m, which are within 2 px or so of pixels (n, 2).
 
     Edges run through them along x and y, with the next ones `pitch` (m) away and nothing else `clear` (m) to both
-    sides. Gives the pixels (n, 2), and their covariances (n, 2, 2) in px².
+    sides.
     """
-    n = len(pixels)
+    n, given = len(pixels), pixels
     crossings = crossings_of(bent_view(view, points, pixels, BENDS_DEGREE), points, pixels, pitch, clear)
     near = replace(crossings, lengths=np.minimum(crossings.lengths, FIRST_LENGTH))
-    rough = _fit(picture, near, FIRST_WIDTH, np.full(n, FIRST_BLUR), Light.unknown(n))
-    good = rough.converged
-    if not good.any():
-        return pixels, np.tile(UNMEASURED_VARIANCE * np.eye(2), (n, 1, 1))
-    pixels = np.where(good[:, None], pixels + rough.parameters[:, :2], pixels)
-    blurs = np.exp(np.where(good, rough.parameters[:, 2], np.median(rough.parameters[good, 2])))
+    width = max(min(FIRST_WIDTH, float(np.median(crossings.clear))), NARROWEST)
+    rough = _fit(picture, near, width, np.full(n, FIRST_BLUR), Light.unknown(n))
+    guesses = np.tile(UNMEASURED_VARIANCE * np.eye(2), (n, 1, 1))
+    found = _shown(rough, picture.noise)
+    if not found.any():
+        return Corners(given, guesses, found)
+    pixels = np.where(found[:, None], pixels + rough.parameters[:, :2], pixels)
+    blurs = np.exp(np.where(found, rough.parameters[:, 2], np.median(rough.parameters[found, 2])))
     sharp = bool(np.median(blurs) < SHARPEST)
     if sharp:
         softened = cv2.GaussianBlur(picture.values, (0, 0), SOFTENING)
         picture = replace(picture, values=np.asarray(softened, dtype=np.float32))
         blurs = np.hypot(blurs, SOFTENING)
 
-    crossings = crossings_of(
-        bent_view(view, points[good], pixels[good], BENDS_DEGREE), points, pixels, pitch, clear
-    )
+    bent = bent_view(view, points[found], pixels[found], BENDS_DEGREE)
+    crossings = crossings_of(bent, points, pixels, pitch, clear)
     levels = np.log(np.maximum(rough.means + np.abs(rough.steps), 1))
-    light = light_at(pixels, levels, good, float(np.median(crossings.lengths)))
+    light = light_at(pixels, levels, found, float(np.median(crossings.lengths)))
     blur = float(np.median(blurs))
     width = max(min(SHOWN * blur, float(np.median(crossings.clear)) - NEIGHBOURS_REACH * blur), NARROWEST)
     fit = _fit(picture, crossings, width, blurs, light)
-    good &= fit.converged
-    pixels = np.where(good[:, None], pixels + fit.parameters[:, :2], pixels)
+    found &= _shown(fit, picture.noise)
     scatter = fit.covariances[:, :2, :2] * (SHARED_NOISE if sharp else 1)
-    measured = scatter + UNMODELLED_VARIANCE * np.eye(2)
-    return pixels, np.where(good[:, None, None], measured, UNMEASURED_VARIANCE * np.eye(2))
+    return Corners(
+        np.where(found[:, None], pixels + fit.parameters[:, :2], given),
+        np.where(found[:, None, None], scatter + UNMODELLED_VARIANCE * np.eye(2), guesses),
+        found,
+    )
 
 
 def crossings_of(view: BentView, points: Floats, pixels: Floats, pitch: float, clear: float) -> Crossings:
     """Say what the corners look like that a view shows at points (n, 2), and that are roughly at pixels (n, 2)."""
-    steps = pitch / 2 * np.eye(2)
-    middle = view.project(points)[:, None]
-    ahead, behind = (view.project(points[:, None] + sign * steps) for sign in (1, -1))
+    steps = pitch / 2 * np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]])
+    middle, ahead, behind = np.split(view.project(points[:, None] + steps), [1, 3], axis=1)
     chords = ahead - behind
     spacings = np.linalg.norm(chords, axis=-1)
     directions = chords / spacings[..., None]
@@ -127,6 +144,16 @@ def _fit(picture: Picture, crossings: Crossings, width: float, blurs: Floats, li
     patches, heights = _patches(picture, crossings, width)
     shape = partial(saddle, crossings.directions.astype(np.float32), heights)
     return fit_grey_values(picture, patches, shape, start, least, light)
+
+
+def _shown(fit: GreyFit, noise: float) -> NDArray[np.bool_]:
+    """Tell which fits (n,) came to an end at a corner, and not at what covers it."""
+    contrasts, (off_x, off_y, blurs) = np.abs(fit.steps), fit.parameters.T
+    shown = fit.converged & (contrasts > noise) & (fit.scatters < np.hypot(2 * noise, MISFIT * contrasts))
+    shown &= np.hypot(off_x, off_y) < MAY_MOVE
+    if shown.any():
+        shown &= blurs < np.median(blurs[shown]) + np.log(MUCH_BLURRED)
+    return shown
 
 
 def _patches(picture: Picture, crossings: Crossings, width: float) -> tuple[Patches, tuple[Singles, Singles]]:

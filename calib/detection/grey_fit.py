@@ -60,7 +60,7 @@ def fit_grey_values(
     its derivatives (n, k, m). The light is a plane, 1 at the piece's origin. What the camera clips, the drawing
     clips as well. The covariance is that of the grey values' scatter about the drawing, of rounding at the least.
     """
-    lowest, highest = picture.values.min(), picture.values.max()
+    lowest, highest = picture.extremes
     n, k = start.shape
     x, y, used = patches.x, patches.y, patches.used
     drawn, slopes = shape(start)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from math import sqrt
 
 import cv2
@@ -32,6 +33,12 @@ class Picture:
         """Width and height, for a message."""
         height, width = self.grey.shape
         return f"{width} x {height} px"
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the greatest of `values`: where a camera clips, if it does."""
+        least, greatest, _, _ = cv2.minMaxLoc(self.values)
+        return least, greatest
 
 
 def read_picture(image: NDArray[np.generic]) -> Picture:

@@ -7,10 +7,11 @@ from drawn_targets import INK, Drawn, draw, project
 from scipy.ndimage import map_coordinates
 
 from calib.detection import Detection, detect
+from calib.detection.corners import measure_corners
 from calib.detection.picture import read_picture
 from calib.detection.plane import PlaneView, bent_view
 from calib.detection.tag_corners import measure_tags
-from calib.targets import AprilGrid, Charuco, Chessboard
+from calib.targets import AprilGrid, Charuco, Chessboard, target_points
 
 CHESSBOARD = Chessboard(rows=6, columns=9, pitch=0.025)
 CHARUCO = Charuco(rows=5, columns=7, pitch=0.03, marker=0.021, dictionary="DICT_5X5_100")
@@ -134,6 +135,22 @@ def test_what_is_no_tag_is_not_measured_as_one():
     expected = draw(APRILGRID).points.reshape(-1, 4, 2)
     measured = measure_tags(read_picture(drawn.picture), APRILGRID, np.arange(20), expected)
     assert not measured.found.any()
+
+
+@pytest.mark.parametrize("off", [0.0, 1.0, 2.0])
+def test_corners_are_measured_from_where_they_are_predicted_and_none_where_there_is_none(off):
+    drawn = draw(CHESSBOARD, tilt=(24, 18), roll=7, blur=0.8, noise=2)
+    covered = 20
+    x, y = np.rint(drawn.points[covered]).astype(int)
+    drawn.picture[y - 12 : y + 13, x - 12 : x + 13] = 120
+    angles = np.random.default_rng(1).uniform(0, 2 * np.pi, len(drawn.points))
+    predicted = drawn.points + off * np.column_stack([np.cos(angles), np.sin(angles)])
+
+    points = target_points(CHESSBOARD)[:, :2]
+    view, pitch = PlaneView(drawn.picture_from_world), CHESSBOARD.pitch
+    corners = measure_corners(read_picture(drawn.picture), view, points, predicted, pitch, pitch / 2)
+    assert np.flatnonzero(~corners.found).tolist() == [covered]
+    assert np.sqrt(np.square(corners.pixels - drawn.points)[corners.found].mean()) < 0.02
 
 
 def test_a_bent_view_follows_the_points_and_what_is_between_them():

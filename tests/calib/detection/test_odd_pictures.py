@@ -2,6 +2,7 @@
 
 import time
 from functools import lru_cache
+from time import process_time
 
 import cv2
 import numpy as np
@@ -79,6 +80,14 @@ def test_one_target_among_others_of_other_kinds_is_found_alone(target):
     other = ALL[(ALL.index(target) + 1) % len(ALL)]
     beside = drawn_once(other, size=(480, 480), tilt=(-10, 10), fill=0.55, noise=1)
     found_or_refused(np.hstack([own.picture, beside.picture]), target, readings(own, target))
+
+
+def test_noise_is_no_chessboard_and_that_is_said_in_seconds():
+    noise = np.random.default_rng(0).integers(0, 256, (1200, 1600)).astype(np.uint8)
+    start = process_time()
+    with pytest.raises(DetectionError, match="noise"):
+        detect(noise, ALL[2])
+    assert process_time() - start < 10
 
 
 @pytest.mark.parametrize("target", ALL, ids=KINDS)
