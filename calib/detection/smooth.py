@@ -43,7 +43,11 @@ def _count(degree: int) -> int:
 
 
 def _terms(at: Floats, count: int) -> Floats:
-    """Give the first so many powers x^i y^j (..., count) of places (..., 2), by growing degree."""
-    powers = [(total - j, j) for total in range(count) for j in range(total + 1)][:count]
+    """Give so many powers x^i y^j (..., count) of places (..., 2): all up to a degree."""
     x, y = at[..., 0], at[..., 1]
-    return np.stack([x**i * y**j for i, j in powers], axis=-1) if powers else np.empty((*x.shape, 0))
+    highest = [np.ones(x.shape)]
+    terms = highest[:count]
+    while len(terms) < count:
+        highest = [*(x * term for term in highest), y * highest[-1]]
+        terms += highest
+    return np.stack(terms, axis=-1) if terms else np.empty((*x.shape, 0))

@@ -17,10 +17,13 @@ OF_SIDES = np.array(
     [[3 * side, 3 * side + 1, 3 * side + 2, 12 + side % 2, 14, 15, 16, 17] for side in range(4)]
 )
 """(4, 8): mean height, half the rise, bow; blur, which opposite sides share; white, black, the light's slopes."""
+OF_TAGS = np.eye(PARAMETERS, dtype=np.float32)[OF_SIDES]
+"""(4, 8, 18): how a side's own parameters change with its tag's."""
 ENDS = np.kron(np.eye(4), [[1, -1, 0], [1, 1, 0]])
 """(8, 12): what the heights of sides at both ends are of HEIGHTS."""
 
 MOST_STEPS = 8
+SETTLED = PARAMETERS  # times the scatter: a step that gains less in squares is below the noise
 LONGEST_STEP, LONGEST_STRETCH = 1.0, 0.5  # px; of the blur's logarithm
 LEAST_BLUR = 0.2  # px
 RIDGE = 1e-6  # of the diagonal
@@ -40,7 +43,7 @@ class TagFit:
     corners, with their `covariances` (n, 8, 8). `look` (n, 6) are the logarithms of the blur (px) across sides 0 and 2
     and sides 1 and 3, the grey values of white and of black in the middle, and the light's relative slopes along x
     and y over a tag's size. `scatter` (n,) is the variance of the grey values about the drawing; `unsettled` (n,)
-    the last step's gain in the sum of squares, over that.
+    what one more step might gain in the sum of squares, over that.
     """
 
     heights: Floats
@@ -91,18 +94,17 @@ def fit_tags(strips: Strips, courses: Floats | None, look: Floats) -> TagFit:
     fitted = np.zeros((n, PARAMETERS))
     fitted[:, LOOK] = look
     for _ in range(MOST_STEPS):
-        jacobian, residuals = _linearised(fitted, strips, above_course, bow, limits)
-        normal, right = _of_tags(
-            jacobian @ jacobian.swapaxes(1, 2), (jacobian @ residuals[..., None])[..., 0]
-        )
-        before, fitted = fitted, fitted + _step(normal, right)
-        fitted[:, BLURS] = np.maximum(fitted[:, BLURS], np.log(LEAST_BLUR))
-        gain = ((fitted - before) * right).sum(axis=1)
-        squares = np.square(residuals).reshape(n, -1).sum(axis=1)
+        normal, right, squares = _of_tags(_linearised(fitted, strips, above_course, bow, limits))
+        inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+        step = _step(inverse, right, fitted[:, BLURS])
+        fitted += step
+        gain = (step * right).sum(axis=1)
         scatter = np.maximum((squares - gain) / freedom, ROUNDING_VARIANCE)
-        if (gain < PARAMETERS * scatter).all():
+        # Near the end, what is left to go is of the second order of the last step.
+        unsettled = np.abs(gain) * _in_blurs(step, fitted[:, BLURS]) ** 2 / scatter
+        if (unsettled < SETTLED).all():
             break
-    covariances = scatter[:, None, None] * np.linalg.inv(normal)
+    covariances = scatter[:, None, None] * inverse
     if courses is not None:
         fitted, covariances = _bowed_alike(fitted, covariances)
     return TagFit(
@@ -110,7 +112,7 @@ def fit_tags(strips: Strips, courses: Floats | None, look: Floats) -> TagFit:
         covariances=ENDS @ covariances[:, HEIGHTS, HEIGHTS] @ ENDS.T,
         look=fitted[:, LOOK],
         scatter=scatter,
-        unsettled=np.abs(gain) / scatter,
+        unsettled=unsettled,
     )
 
 
@@ -122,8 +124,11 @@ def _limits(strips: Strips) -> tuple[float, float]:
 
 def _linearised(
     fitted: Floats, strips: Strips, above_course: Singles, bow: Singles, limits: tuple[float, float]
-) -> tuple[Singles, Singles]:
-    """Draw tags of parameters (n, 18): how the pixels change with sides' own (s, 8, m), and what is left (s, m)."""
+) -> Singles:
+    """Draw tags of parameters (n, 18): how the pixels change with sides' own, and in the last row what is left.
+
+    Gives (s, 9, m).
+    """
     mean, rise, bowed, blur, white, black, along_x, along_y = np.moveaxis(
         fitted.astype(np.float32)[:, OF_SIDES].reshape(-1, 8, 1), 1, 0
     )
@@ -142,7 +147,7 @@ def _linearised(
     reflected *= counted
     contrast = (black - white) * light
     by_height *= contrast
-    changes = np.empty((len(mean), 8, strips.used.shape[1]), dtype=np.float32)
+    changes = np.empty((len(mean), 9, strips.used.shape[1]), dtype=np.float32)
     np.negative(by_height, out=changes[:, 0])
     np.multiply(changes[:, 0], strips.along, out=changes[:, 1])
     np.multiply(changes[:, 0], bow, out=changes[:, 2])
@@ -151,7 +156,9 @@ def _linearised(
     np.subtract(light, changes[:, 5], out=changes[:, 4])
     np.multiply(reflected, strips.x, out=changes[:, 6])
     np.multiply(reflected, strips.y, out=changes[:, 7])
-    return changes, strips.used * (strips.values - np.clip(model, *limits))
+    np.subtract(strips.values, np.clip(model, *limits, out=model), out=changes[:, 8])
+    changes[:, 8] *= strips.used
+    return changes
 
 
 def _ink(heights: Singles, blur: Singles, strips: Strips) -> tuple[Singles, Singles, Singles]:
@@ -159,32 +166,44 @@ def _ink(heights: Singles, blur: Singles, strips: Strips) -> tuple[Singles, Sing
     drawings = edge_in_pixels(heights, blur)
     cells = strips.cells
     if len(cells.white):
-        at = cells.side, cells.pixel
-        behind = edge_in_pixels(heights[at] - cells.depths, blur[cells.side, 0])
+        behind = edge_in_pixels(heights.take(cells.at) - cells.depths, blur.take(cells.side))
         for drawing, part in zip(drawings, behind, strict=True):
-            drawing[at] -= cells.white * part
+            drawing.ravel()[cells.at] -= cells.white * part
     return drawings
 
 
-def _of_tags(of_sides: Singles, right_of_sides: Singles) -> tuple[Floats, Floats]:
-    """Put the normal equations of sides, (4 n, 8, 8) and (4 n, 8), together to tags' (n, 18, 18) and (n, 18)."""
-    n = len(of_sides) // 4
-    normal, right = np.zeros((n, PARAMETERS, PARAMETERS)), np.zeros((n, PARAMETERS))
-    for side, places in enumerate(OF_SIDES):
-        normal[:, places[:, None], places] += of_sides[side::4]
-        right[:, places] += right_of_sides[side::4]
+def _of_tags(changes: Singles) -> tuple[Floats, Floats, Floats]:
+    """Put the normal equations of sides, of changes (4 n, 9, m), together to tags': (n, 18, 18) and (n, 18).
+
+    Gives the sums (n,) of what is left in squares, too.
+    """
+    own, left = changes[:, :-1], changes[:, -1]
+    of_sides = (own @ changes.swapaxes(1, 2)).reshape(-1, *OF_SIDES.shape, changes.shape[1])
+    to_tags = OF_TAGS.swapaxes(1, 2) @ of_sides
+    normal = (to_tags[..., :-1] @ OF_TAGS).sum(axis=1, dtype=np.float64)
+    right = to_tags[..., -1].sum(axis=1, dtype=np.float64)
     # A tag without contrast, or all clipped, has no shape to speak of; it must not keep the others from theirs.
-    return normal + (RIDGE * np.diagonal(normal, axis1=1, axis2=2)[:, None] + 1e-9) * np.eye(
-        PARAMETERS
-    ), right
+    diagonal = np.einsum("nii->ni", normal)
+    diagonal *= 1 + RIDGE
+    diagonal += 1e-9
+    squares = np.einsum("sm,sm->s", left, left).reshape(-1, len(OF_SIDES)).sum(axis=1)
+    return normal, right, np.asarray(squares, dtype=np.float64)
 
 
-def _step(normal: Floats, right: Floats) -> Floats:
-    """Solve the normal equations, and shorten steps that are too long for them to hold."""
-    step = np.asarray(np.linalg.solve(normal, right[..., None])[..., 0], dtype=np.float64)
+def _step(inverse: Floats, right: Floats, blurs: Floats) -> Floats:
+    """Solve the normal equations, and shorten steps that are too long for them to hold, or blurs (n, 2) to shrink."""
+    step = (inverse @ right[..., None])[..., 0]
     too_long = np.abs(step[:, HEIGHTS]).max(axis=1) / LONGEST_STEP
     stretched = np.abs(step[:, BLURS]).max(axis=1) / LONGEST_STRETCH
-    return np.asarray(step / np.maximum(np.maximum(too_long, stretched), 1)[:, None])
+    step /= np.maximum(np.maximum(too_long, stretched), 1)[:, None]
+    step[:, BLURS] = np.maximum(step[:, BLURS], np.log(LEAST_BLUR) - blurs)
+    return np.asarray(step)
+
+
+def _in_blurs(step: Floats, blurs: Floats) -> Floats:
+    """Say how long steps (n, 18) are: of the sides over the blurs (n, 2), or of the blurs themselves."""
+    moved = np.abs(step[:, HEIGHTS]).max(axis=1) / np.exp(blurs).min(axis=1)
+    return np.asarray(np.maximum(moved, np.abs(step[:, BLURS]).max(axis=1)))
 
 
 def _bowed_alike(fitted: Floats, covariances: Floats) -> tuple[Floats, Floats]:

@@ -25,13 +25,14 @@ MOST_CUT = 0.3  # of a side, at either end
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The k pixels of strips that see white cells behind the border: those at `side` (k,) and `pixel` (k,).
+    """The k pixels of strips that see white cells behind the border: of each its `side` (k,) and its place `at` (k,).
 
-    The cells begin at `depths` (k,) px, and as much as `white` (k,) of their row is seen to be white there.
+    The places count all pixels of all sides, one after the other. The cells begin at `depths` (k,) px, and as much as
+    `white` (k,) of their row is seen to be white there.
     """
 
     side: NDArray[np.int64]
-    pixel: NDArray[np.int64]
+    at: NDArray[np.int64]
     depths: Singles
     white: Singles
 
@@ -81,14 +82,14 @@ def strips_along(picture: Picture, sides: Sides, blur: float, unknown: Floats, l
     middle = ((inside - outside)[..., None] / 2 - normal[..., :1] * off_right) / normal[..., 1:]
     down = np.rint(start[..., 1:] + middle)
     off_down = down - start[..., 1:]
-    half = int(np.ceil(((inside + outside) / 2 / np.abs(normal[..., 1])).max(initial=0)))
-    across = np.arange(-half, half + 1)
+    half = int(((inside + outside) / 2 / np.abs(normal[..., 1])).max(initial=0) + 0.5)
+    across = np.arange(-half, half + 1, dtype=np.int32)[:, None]
 
     def over_pixels(by_right: Floats, by_down: Floats) -> Singles:
         """Give what grows by so much (n, 4) with each px right and down, and is 0 at the sides' starts."""
         at_lines = by_right[..., None] * off_right + by_down[..., None] * off_down
-        steps = by_down[..., None] * across
-        grown = at_lines.astype(np.float32)[..., None] + steps.astype(np.float32)[..., None, :]
+        steps = by_down[..., None, None] * across
+        grown = at_lines.astype(np.float32)[..., None, :] + steps.astype(np.float32)
         return np.asarray(grown.reshape(by_right.size, -1))
 
     heights = over_pixels(normal[..., 0], normal[..., 1])
@@ -102,17 +103,18 @@ def strips_along(picture: Picture, sides: Sides, blur: float, unknown: Floats, l
         for axis in range(2)
     )
 
-    size = np.array(picture.values.shape[::-1])[order][..., None, :]
-    on_lines = (right >= 0) & (right < size[..., 0]) & (right <= high[..., None])
-    down = down[..., None].astype(np.intp) + across
-    seen = (down >= 0) & (down < size[..., None, 1]) & on_lines[..., None]
+    size = np.array(picture.values.shape[::-1])[order]
+    on_lines = (right >= 0) & (right < size[..., :1]) & (right <= high[..., None])
+    down_to = down.astype(np.int32)[..., None, :] + across
+    seen = (down_to >= 0) & (down_to < size.astype(np.int32)[..., 1:, None]) & on_lines[..., None, :]
     used = seen.reshape(heights.shape)
     used &= (heights <= _column(inside)) & (heights >= _column(-outside))
     used &= (along >= _column(2 * first - 1)) & (along <= _column(2 * last - 1))
     strides = np.array([1, picture.values.shape[1]])[order]
-    rows = (np.clip(right, 0, size[..., 0] - 1) * strides[..., :1]).astype(np.intp)
-    index = rows[..., None] + np.clip(down, 0, size[..., None, 1] - 1) * strides[..., 1:, None]
-    values = picture.values.ravel()[index].reshape(heights.shape)
+    index = (right * strides[..., :1] + down * strides[..., 1:]).astype(np.intp)[..., None, :]
+    index = index + strides[..., 1:, None] * across
+    # What is out of the picture is not used, whatever is taken for it.
+    values = picture.values.take(index, mode="clip").reshape(heights.shape)
     cells = _cells_seen(sides, heights, along, used, blur)
     return Strips(heights, along, x, y, values, used.astype(np.float32), cells)
 
@@ -135,21 +137,19 @@ def _cells_seen(
     blurred = np.float32(np.sqrt(blur**2 + PIXEL_VARIANCE))
     start, end = (_column(sides.depths[..., which]) for which in range(2))
     above = heights - ((start + end) / 2 + (end - start) / 2 * along)
-    side, pixel = np.nonzero(used & (above > -SHOWN * blurred))
-    at = side, pixel
-    off: Singles = np.asarray(above[at])
+    at = np.flatnonzero(used & (above > -SHOWN * blurred))
+    side = at // heights.shape[1]
+    off = np.asarray(above.take(at), dtype=np.float32)
     scaled: Singles = np.asarray(off / blurred, dtype=np.float32)
     seen_at = off + blurred * density(scaled) / np.maximum(blurred_step(scaled), np.float32(1e-3))
-    scale = _column(sides.lengths / 2) / blurred
     borders, leans, jumps = (
-        part.reshape(len(heights), -1).astype(np.float32)
+        part.reshape(len(heights), -1).astype(np.float32).take(side, axis=0)
         for part in (sides.borders, sides.leans, sides.jumps)
     )
-    beyond = along[at][:, None] - borders[side] - leans[side] * seen_at[:, None]
-    steps = blurred_step(np.asarray(scale[side] * beyond, dtype=np.float32))
-    white = (steps * jumps[side]).sum(axis=1)
-    depths: Singles = heights[at] - off
-    return Cells(side, pixel, depths, white)
+    beyond = along.take(at)[:, None] - borders - leans * seen_at[:, None]
+    beyond *= (_column(sides.lengths / 2) / blurred).take(side)[:, None]
+    white = (blurred_step(beyond) * jumps).sum(axis=1)
+    return Cells(side, at, heights.take(at) - off, white)
 
 
 def _column(of_sides: Floats) -> Singles:
