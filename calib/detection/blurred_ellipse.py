@@ -149,28 +149,29 @@ def _seen(ellipses: Ellipses, x: Values, y: Values) -> _Seen:
 
 
 def _equations(ellipses: Ellipses, edges: Samples, plain: Samples, inside: Values) -> _Equations:
-    near, left_near = _near_edges(ellipses, edges)
-    light = np.empty((len(inside), LIGHT.stop - LIGHT.start, inside.shape[1]), np.float32)
-    left = plain.values - _under_light(ellipses, plain.x, plain.y, inside, light)
+    near = _near_edges(ellipses, edges)
+    light = np.empty((len(inside), LIGHT.stop - LIGHT.start + 1, inside.shape[1]), np.float32)
+    light[:, -1] = plain.values - _under_light(ellipses, plain.x, plain.y, inside, light[:, :-1])
     # A block's mean has less noise than a pixel.
-    roots = np.sqrt(plain.weights)
-    light *= roots[:, None]
-    left *= roots
-    matrices = (near @ near.swapaxes(1, 2)).astype(np.float64)
-    matrices[:, LIGHT, LIGHT] += light @ light.swapaxes(1, 2)
-    sides = (near @ left_near[..., None])[..., 0].astype(np.float64)
-    sides[:, LIGHT] += (light @ left[..., None])[..., 0]
-    squares = np.square(left_near).sum(axis=1) + np.square(left).sum(axis=1)
-    return _Equations(matrices, sides, squares.astype(np.float64))
+    light *= np.sqrt(plain.weights)[:, None]
+    # All but the last row times all of them: numpy takes several times as long for a product with itself.
+    products = (near[:, :-1] @ near.swapaxes(1, 2)).astype(np.float64)
+    products[:, LIGHT, [*range(LIGHT.start, LIGHT.stop), -1]] += light[:, :-1] @ light.swapaxes(1, 2)
+    squares = np.square(near[:, -1]).sum(axis=1) + np.square(light[:, -1]).sum(axis=1)
+    return _Equations(products[..., :-1], products[..., -1], squares.astype(np.float64))
 
 
-def _near_edges(ellipses: Ellipses, edges: Samples) -> tuple[Values, Values]:
-    """Return the derivatives (n, 10, m) of grey values near edges by all parameters, and what is left (n, m)."""
+def _near_edges(ellipses: Ellipses, edges: Samples) -> Values:
+    """Return the derivatives of grey values near edges by all parameters, and in the last row what is left.
+
+    All are (n, 11, m).
+    """
     (vx, vy), (nx, ny), radius, steepness, depth = _seen(ellipses, edges.x, edges.y)
-    jacobian = np.empty((len(vx), PARAMETERS, vx.shape[1]), np.float32)
+    rows = np.empty((len(vx), PARAMETERS + 1, vx.shape[1]), np.float32)
+    jacobian = rows[:, :-1]
     blur = _rows(ellipses.blurs)
     inwards = depth / blur
-    left = edges.values - _under_light(ellipses, edges.x, edges.y, ndtr(inwards), jacobian[:, LIGHT])
+    rows[:, -1] = edges.values - _under_light(ellipses, edges.x, edges.y, ndtr(inwards), jacobian[:, LIGHT])
     of_paper, of_ink = ellipses.reflectances()
     by_light = of_ink - of_paper
     contrast = _rows(ellipses.ink - ellipses.paper)
@@ -185,9 +186,8 @@ def _near_edges(ellipses: Ellipses, edges: Samples) -> tuple[Values, Values]:
     np.multiply(2 * by_shape * vx, vy, out=jacobian[:, 3])
     np.multiply(by_shape * vy, vy, out=jacobian[:, 4])
     np.multiply(rise, -inwards, out=jacobian[:, BLUR])
-    jacobian *= edges.weights[:, None]
-    left *= edges.weights
-    return jacobian, left
+    rows *= edges.weights[:, None]
+    return rows
 
 
 def _under_light(ellipses: Ellipses, x: Values, y: Values, inside: Values, derivatives: Values) -> Values:

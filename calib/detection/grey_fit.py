@@ -68,7 +68,8 @@ def fit_grey_values(
     fitted = np.concatenate([start, _levels(drawn, patches), light.slopes], axis=1)
     prior = np.zeros(k + 4)
     prior[k + 2 :] = (picture.noise / light.std) ** 2
-    jacobian = np.empty((n, k + 4, used.shape[1]), dtype=np.float32)
+    rows = np.empty((n, k + 5, used.shape[1]), dtype=np.float32)
+    jacobian, residuals = rows[:, :-1], rows[:, -1]
     for _ in range(MOST_STEPS):
         mean, step, along_x, along_y = fitted[:, k:].T[..., None].astype(np.float32)
         lit = 1 + along_x * x + along_y * y
@@ -81,11 +82,14 @@ def fit_grey_values(
         reflected *= counted
         np.multiply(x, reflected, out=jacobian[:, k + 2])
         np.multiply(y, reflected, out=jacobian[:, k + 3])
-        residuals = used * (patches.values - np.clip(model, lowest, highest))
-        normal = (jacobian @ jacobian.swapaxes(1, 2)).astype(np.float64) + np.diag(prior)
+        np.subtract(patches.values, np.clip(model, lowest, highest, out=model), out=residuals)
+        residuals *= used
+        # numpy takes several times as long for a product of the jacobian with itself.
+        equations = (jacobian @ rows.swapaxes(1, 2)).astype(np.float64)
+        normal = equations[..., :-1] + np.diag(prior)
         # A piece without contrast has no shape to speak of; it must not keep the others from theirs.
         normal += (1e-6 * np.diagonal(normal, axis1=1, axis2=2)[:, None] + 1e-9) * np.eye(k + 4)
-        right = (jacobian @ residuals[..., None])[..., 0] - prior * (fitted - expected)
+        right = equations[..., -1] - prior * (fitted - expected)
         change = np.linalg.solve(normal, right[..., None])[..., 0]
         before = fitted[:, :k]
         fitted = fitted + change
