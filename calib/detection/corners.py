@@ -18,7 +18,7 @@ from calib.detection.smooth import smooth
 from calib.detection.strips import Floats, Patches, Singles, strips
 
 REACHED = 0.5  # of the way to the next corner, so that no pixel tells of two
-FIRST_LENGTH, FIRST_WIDTH = 8.0, 4.0  # px; of the edges and to both sides, while corners are known roughly
+FIRST_LENGTH, FIRST_WIDTH = 10.0, 5.0  # px; of the edges and to both sides, while corners are known roughly
 SHOWN = (
     3.0  # standard deviations of the blur to both sides of an edge: what tells where it is, and its levels
 )
@@ -28,7 +28,7 @@ NEIGHBOURS_REACH = 2.0
 SHARPEST = 0.45  # px; in sharper pictures places depend on where the pixels lie
 SOFTENING = 1.0  # px, standard deviation
 SHARED_NOISE = 4 * pi * SOFTENING**2  # pixels of a softened picture that have one noise
-BENDS_DEGREE, LIGHTS_DEGREE = 5, 2
+LIGHTS_DEGREE = 3
 LEAST_SLOPE = 1e-6  # of the light a px
 MAY_MOVE = 4.0  # px from where a corner was thought to be; further off is another
 MUCH_BLURRED = 3.0  # times what most are; what is more so is no crossing of edges
@@ -85,7 +85,7 @@ def measure_corners(
     sides.
     """
     n, given = len(pixels), pixels
-    crossings = crossings_of(bent_view(view, points, pixels, BENDS_DEGREE), points, pixels, pitch, clear)
+    crossings = crossings_of(bent_view(view, points, pixels, picture.middle), points, pixels, pitch, clear)
     near = replace(crossings, lengths=np.minimum(crossings.lengths, FIRST_LENGTH))
     width = max(min(FIRST_WIDTH, float(np.median(crossings.clear))), NARROWEST)
     rough = _fit(picture, near, width, np.full(n, FIRST_BLUR), Light.unknown(n))
@@ -101,7 +101,7 @@ def measure_corners(
         picture = replace(picture, values=np.asarray(softened, dtype=np.float32))
         blurs = np.hypot(blurs, SOFTENING)
 
-    bent = bent_view(view, points[found], pixels[found], BENDS_DEGREE)
+    bent = bent_view(view, points[found], pixels[found], picture.middle)
     crossings = crossings_of(bent, points, pixels, pitch, clear)
     levels = np.log(np.maximum(rough.means + np.abs(rough.steps), 1))
     light = light_at(pixels, levels, found, float(np.median(crossings.lengths)))
@@ -188,7 +188,9 @@ def saddle(
     derivatives[:, 0] = one_y * by_one + other_y * by_other
     derivatives[:, 1] = -one_x * by_one - other_x * by_other
     derivatives[:, 2] = -(one_height * by_one + other_height * by_other) / scale
-    return one * other, derivatives
+    # Where the edges are not at right angles, blur rounds the corner off: the first term of the tetrachoric series.
+    slanted = one_x * other_x + one_y * other_y
+    return one * other + 4 * slanted * one_slope * other_slope, derivatives
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,11 +55,9 @@ class Places:
 
     def moved(self, step: Sequence[int]) -> Places:
         """Shift all places by (2,) px."""
-        bend = replace(self.view.bend, middle=self.view.bend.middle + step)
-        view = BentView(self.view.view.moved(np.array([[1.0, 0, step[0]], [0, 1, step[1]], [0, 0, 1]])), bend)
-        return Places(self.marks, view, self.listed + step, self.across)
+        return Places(self.marks, self.view.shifted(step), self.listed + step, self.across)
 
     def mapped(self, homography: Array) -> Places:
         """Move all places by a homography (3, 3) of the picture, which hardly turns or scales."""
-        view = BentView(self.view.view.moved(homography), self.view.bend)
-        return Places(self.marks, view, PlaneView(homography).project(self.listed), self.across)
+        listed = PlaneView(homography).project(self.listed)
+        return Places(self.marks, self.view.moved(homography), listed, self.across)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -12,6 +13,9 @@ from calib.detection.smooth import Smooth, smooth
 
 FEWEST = 4  # points that tell a plane's view
 NARROWEST = 1e-6  # m; points that are off a line by no more are on it
+LENS_STEPS = 5
+UNTOLD = 1e-3  # of what points tell best; what they tell less of the lens is left as it is
+REST_DEGREE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,23 +47,77 @@ class PlaneView:
 
 @dataclass(frozen=True, eq=False)
 class BentView:
-    """A view through a lens that bends lines: `view`, and by how much (px) what is seen is off its pixels."""
+    """A view through a lens that bends lines: `view` is what is seen without the lens.
+
+    The lens moves places by `distortion` (5,), three radial and two tangential coefficients, about `middle` (2,), from
+    where distances are taken in units of `span` px; what it moves otherwise is the `rest`, in px.
+    """
 
     view: PlaneView
-    bend: Smooth
+    middle: NDArray[np.float64]
+    span: float
+    distortion: NDArray[np.float64]
+    rest: Smooth
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map points (..., 2) in metres to pixels (..., 2)."""
         pixels = self.view.project(points)
-        return pixels + self.bend.at(pixels)
+        bends = _bends((pixels - self.middle) / self.span) @ self.distortion
+        return np.asarray(pixels + self.span * bends + self.rest.at(pixels))
+
+    def shifted(self, step: Sequence[int]) -> BentView:
+        """Return the same view in a picture whose places, and the lens's, are (2,) px further."""
+        shift = np.array([[1.0, 0, step[0]], [0, 1, step[1]], [0, 0, 1]])
+        rest = replace(self.rest, middle=self.rest.middle + step)
+        return replace(self, view=self.view.moved(shift), middle=self.middle + step, rest=rest)
+
+    def moved(self, homography: NDArray[np.float64]) -> BentView:
+        """Return the view of the same plane, moved by a homography (3, 3) of the picture, through the same lens."""
+        return replace(self, view=self.view.moved(homography))
 
 
 def bent_view(
-    view: PlaneView, points: NDArray[np.float64], pixels: NDArray[np.float64], degree: int = 3
+    view: PlaneView, points: NDArray[np.float64], pixels: NDArray[np.float64], middle: NDArray[np.float64]
 ) -> BentView:
-    """Fit what the pixels (n, 2) of points (n, 2) are off the view, by polynomials of such a degree at most."""
-    seen = view.project(points)
-    return BentView(view, smooth(seen, pixels - seen, degree))
+    """Fit view and lens to the pixels (n, 2) of points (n, 2), from a view that is about right.
+
+    `middle` (2,) is about where the lens looks. What few points do not tell is left out.
+    """
+    span = max(float(np.abs(pixels - middle).max()), 1.0)
+    to_pixels = np.array([[span, 0, middle[0]], [0, span, middle[1]], [0, 0, 1]])
+    H = np.linalg.inv(to_pixels) @ view.picture_from_plane
+    seen = (pixels - middle) / span
+    distortion = np.zeros(5)
+    for _ in range(LENS_STEPS):
+        at = PlaneView(H).project(points)
+        bends = _bends(at)
+        off = seen - at - bends @ distortion
+        # As if the lens changed small changes of the homography by nothing: the next step mends it.
+        slopes = np.concatenate([_small_changes(at), bends], axis=-1).reshape(-1, 13)
+        change = np.linalg.lstsq(slopes, off.ravel(), rcond=UNTOLD)[0]
+        H = (np.eye(3) + np.append(change[:8], 0).reshape(3, 3)) @ H
+        distortion = distortion + change[8:]
+    at = PlaneView(H).project(points)
+    without_lens = PlaneView(to_pixels @ H)
+    off = span * (seen - at - _bends(at) @ distortion)
+    return BentView(without_lens, middle, span, distortion, smooth(middle + span * at, off, REST_DEGREE))
+
+
+def _bends(at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give by how much (..., 2, 5) each of a lens' coefficients moves places (..., 2): Brown's, as in `BentView`."""
+    x, y = at[..., 0], at[..., 1]
+    squares = x * x + y * y
+    along_x = [x * squares, x * squares**2, x * squares**3, 2 * x * y, squares + 2 * x * x]
+    along_y = [y * squares, y * squares**2, y * squares**3, squares + 2 * y * y, 2 * x * y]
+    return np.stack([np.stack(along_x, axis=-1), np.stack(along_y, axis=-1)], axis=-2)
+
+
+def _small_changes(at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give by how much (n, 2, 8) the entries of a homography near to identity, but the last, move places (n, 2)."""
+    here = np.column_stack([at, np.ones(len(at))])
+    nothing = np.zeros_like(here)
+    rows = np.stack([np.hstack([here, nothing]), np.hstack([nothing, here])], axis=1)
+    return np.concatenate([rows, -at[:, :, None] * at[:, None]], axis=-1)
 
 
 def span_a_plane(points: NDArray[np.float64]) -> bool:

@@ -56,7 +56,7 @@ def measure_tags(picture: Picture, target: AprilGrid, tags: NDArray[np.int64], c
             break
     sides = sides_of(target, tags, near)
     strips = strips_along(picture, sides, blur, np.zeros_like(unknown), MANY_LINES)
-    fit = fit_tags(strips, _courses(target, tags, sides), look)
+    fit = fit_tags(strips, _courses(picture, target, tags, sides), look)
     pixels, covariances = _crossings(sides, fit)
 
     shortest = sides.lengths.min(axis=1)
@@ -68,7 +68,7 @@ def measure_tags(picture: Picture, target: AprilGrid, tags: NDArray[np.int64], c
     return TagCorners(pixels, covariances + UNMODELLED_VARIANCE * np.eye(2), found)
 
 
-def _courses(target: AprilGrid, tags: NDArray[np.int64], sides: Sides) -> Floats:
+def _courses(picture: Picture, target: AprilGrid, tags: NDArray[np.int64], sides: Sides) -> Floats:
     """Say how the lens bends sides: as it does the places of all corners. The courses (n, 4, 2) are `fit_tags`'s."""
     plane = target_points(target)[:, :2].reshape(-1, 4, 2)[tags]
     points, pixels = plane.reshape(-1, 2), sides.corners.reshape(-1, 2)
@@ -76,7 +76,7 @@ def _courses(target: AprilGrid, tags: NDArray[np.int64], sides: Sides) -> Floats
     if view is None:
         return np.zeros((*sides.lengths.shape, 2))
     along = np.array([0, 0.25, 0.75, 1])[:, None]
-    seen = bent_view(view, points, pixels).project(
+    seen = bent_view(view, points, pixels, picture.middle).project(
         plane[:, :, None] + along * (plane[:, AFTER] - plane)[:, :, None]
     )
     first, last = seen[:, :, :1], seen[:, :, 3:]

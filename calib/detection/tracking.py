@@ -13,7 +13,7 @@ from calib.detection.detection import Detection
 from calib.detection.lattice import Lattice
 from calib.detection.looks import Looks, look_at
 from calib.detection.marks import Marks, marks_of
-from calib.detection.picture import Picture
+from calib.detection.picture import Picture, require_picture
 from calib.detection.places import Places
 from calib.detection.plane import FEWEST, BentView, bent_view, span_a_plane, view_of_plane
 from calib.detection.shifts import moved_together, shifts_of
@@ -64,8 +64,10 @@ def track(image: NDArray[np.generic], target: Target, predicted: Prediction) -> 
 
     Raises DetectionError where too few points are there to be sure of them: look for the target with `detect`.
     """
+    require_picture(image)
+    middle = (np.array(image.shape[1::-1]) - 1) / 2
     marks = marks_of(target)
-    places = Places.expected(marks, _view(target, predicted))
+    places = Places.expected(marks, _view(target, predicted, middle))
     window = window_on(image, places, predicted.off)
     places = places.moved([-window.left, -window.top])
     places = moved_together(places, *shifts_of(window, marks, places, predicted.off))
@@ -93,14 +95,14 @@ def track(image: NDArray[np.generic], target: Target, predicted: Prediction) -> 
     return Detection(ids, pixels, measured.covariances[measured.good], disk)
 
 
-def _view(target: Target, predicted: Prediction) -> BentView:
+def _view(target: Target, predicted: Prediction, middle: Array) -> BentView:
     points = target_points(target)[predicted.ids, :2]
     view = view_of_plane(points, predicted.pixels)
     if view is None:
         raise DetectionError(
             f"{len(points)} predicted points don't tell where the target lies: {FEWEST} or more not on one line do"
         )
-    return bent_view(view, points, predicted.pixels)
+    return bent_view(view, points, predicted.pixels, middle)
 
 
 def _is_unshifted(lattice: Lattice, marks: Marks, looks: Looks, ids: NDArray[np.int64]) -> bool:

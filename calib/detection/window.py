@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.picture import grey_values, noise_of, require_picture
+from calib.detection.picture import grey_values, noise_of
 from calib.detection.places import Places
 from calib.errors import DetectionError
 
@@ -46,9 +46,8 @@ class Window:
 def window_on(image: NDArray[np.generic], places: Places, off: float) -> Window:
     """Take the part of a picture in which places are that may be off by so many px.
 
-    Raises DetectionError where it is no picture, or hardly one of the places can be in it.
+    Raises DetectionError where hardly one of the places can be in it.
     """
-    require_picture(image)
     (left, right), (top, bottom) = (
         np.clip([np.floor(at.min() - off), np.ceil(at.max() + off) + 1], 0, size).astype(int).tolist()
         for at, size in zip(places.listed.T, image.shape[1::-1], strict=True)

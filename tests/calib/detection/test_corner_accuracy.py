@@ -153,16 +153,24 @@ def test_corners_are_measured_from_where_they_are_predicted_and_none_where_there
     assert np.sqrt(np.square(corners.pixels - drawn.points)[corners.found].mean()) < 0.02
 
 
-def test_a_bent_view_follows_the_points_and_what_is_between_them():
+def test_a_bent_view_follows_a_lens_by_few_points_and_between_them():
     view = PlaneView(np.array([[1000.0, 20, 300], [-30, 900, 200], [0.1, 0.2, 1]]))
-    points = np.stack(np.meshgrid(np.linspace(0, 0.2, 8), np.linspace(0, 0.15, 6)), axis=-1).reshape(-1, 2)
+    points = np.stack(np.meshgrid(np.linspace(0, 0.6, 4), np.linspace(0, 0.6, 3)), axis=-1).reshape(-1, 2)
+    lens = np.array([[800.0, 0, 600], [0, 800, 450], [0, 0, 1]])
 
     def seen(at: np.ndarray) -> np.ndarray:
-        pixels = view.project(at)
-        return pixels + 1e-4 * np.square(pixels - 300)
+        rays = np.column_stack([(view.project(at) - [600, 450]) / 800, np.ones(len(at))])
+        distortion = np.array([-0.2, 0.05, 1e-3, -1e-3])
+        return cv2.projectPoints(rays, np.zeros(3), np.zeros(3), lens, distortion)[0].reshape(-1, 2)
 
-    between = points[:-1] + 0.01
-    fitted = bent_view(view, points, seen(points))
-    np.testing.assert_allclose(fitted.project(between), seen(between), atol=1e-6)
-    one = bent_view(view, points[:1], seen(points[:1]))
-    np.testing.assert_allclose(one.project(points), view.project(points), atol=1e-9)
+    between = (points[:-1] + points[1:]) / 2
+    assert np.abs(seen(between) - view.project(between)).max() > 5
+    bent = bent_view(view, points, seen(points), np.array([610.0, 445]))
+    np.testing.assert_allclose(bent.project(between), seen(between), atol=0.03)
+
+
+def test_a_view_is_bent_by_no_more_than_one_point_tells():
+    view = PlaneView(np.array([[1000.0, 20, 300], [-30, 900, 200], [0.1, 0.2, 1]]))
+    points = np.stack(np.meshgrid(np.linspace(0, 0.2, 8), np.linspace(0, 0.15, 6)), axis=-1).reshape(-1, 2)
+    bent = bent_view(view, points[:1], view.project(points[:1]) + 1, np.array([400.0, 300]))
+    np.testing.assert_allclose(bent.project(points), view.project(points), atol=1.5)
