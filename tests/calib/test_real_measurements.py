@@ -61,7 +61,10 @@ def arm() -> Session:
 
 
 def test_every_fourth_view_of_the_arm_is_predicted_by_the_others(arm: Session) -> None:
-    """Its nominal model is 1.33 px off, a plain least-squares fit 0.66 px and up to 0.96, by which are held out."""
+    """Its nominal model is 1.33 px off, a plain least-squares fit 0.66 px and up to 0.96, by which are held out.
+
+    All four parts count, each view held out once: one part alone moves by 0.015 px with corners by a few thousandths.
+    """
     held_out, fitted = [], []
     for part in range(4):
         views = [
@@ -73,9 +76,8 @@ def test_every_fourth_view_of_the_arm_is_predicted_by_the_others(arm: Session) -
         assert quality.rms_px is not None
         held_out.append(quality.held_out_rms_px)
         fitted.append(quality.rms_px)
-    assert held_out[3] <= 0.60
+    assert np.sqrt(np.mean(np.square(held_out))) <= 0.60
     assert fitted[3] <= 0.38
-    assert np.sqrt(np.mean(np.square(held_out))) < 0.62
 
 
 def test_lens_of_opencv_left() -> None:
