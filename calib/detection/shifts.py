@@ -42,12 +42,14 @@ def shifts_of(window: Window, marks: Marks, places: Places, off: float) -> tuple
     return found if shifts is None else shifts + found, contrasted
 
 
-def _searched(window: Window, marks: Marks, places: Places, off: float, step: float) -> Array | None:
-    """Try shifts of up to `off` px of each mark by itself, `step` px apart: where ink and paper differ most (m, 2).
+def _searched(window: Window, marks: Marks, places: Places, off: float, clear: float) -> Array | None:
+    """Try shifts of up to `off` px of each mark by itself: where ink and paper differ most (m, 2).
 
-    None where a step goes further.
+    They are half of what is `clear` (px) across edges apart: an edge that is further off than that is seen together
+    with what is beyond. None where that is further than `off`.
     """
-    furthest = min(off, FURTHEST * marks.spacing / marks.clear * step)
+    furthest = min(off, FURTHEST * marks.spacing / marks.clear * clear)
+    step = clear / 2
     if furthest <= step:
         return None
     count = int(furthest / step)
