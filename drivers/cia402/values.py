@@ -1,8 +1,8 @@
 """The values of a drive's object dictionary, read and written by SDO, in the link's thread."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import canopen
 from canopen.sdo import SdoAbortedError, SdoCommunicationError
@@ -10,6 +10,11 @@ from canopen.sdo.constants import ABORT_NO_SUBINDEX, ABORT_NOT_IN_OD
 
 from drivers.cia402.objects import Entry
 from drivers.errors import DeviceFaultError, DeviceLostError, OptionsError
+
+T = TypeVar("T")
+
+STALE_ANSWERS = 2
+"""Exchanges in which a late drive's answer to an earlier request may come first."""
 
 
 class Values:
@@ -26,13 +31,13 @@ class Values:
     def read(self, entry: Entry) -> int:
         """Read a value."""
         with self.answering(f"to tell its object {entry}"):
-            return int(self._variable(entry).raw)
+            return _exchanged(lambda: int(self._variable(entry).raw))
 
     def read_if_there(self, entry: Entry) -> int | None:
         """Read a value that a drive may do without."""
         with self.answering(f"to tell its object {entry}"):
             try:
-                return int(self._variable(entry).raw)
+                return _exchanged(lambda: int(self._variable(entry).raw))
             except SdoAbortedError as error:
                 if error.code in {ABORT_NOT_IN_OD, ABORT_NO_SUBINDEX}:
                     return None
@@ -41,7 +46,7 @@ class Values:
     def write(self, entry: Entry, value: int) -> None:
         """Write a value."""
         with self.answering(f"{value} for its object {entry}"):
-            self._variable(entry).raw = value
+            _exchanged(lambda: setattr(self._variable(entry), "raw", value))
 
     def write_if_there(self, entry: Entry, value: int) -> bool:
         """Write a value that a drive may do without; return whether it has it."""
@@ -75,3 +80,17 @@ class Values:
     def _variable(self, entry: Entry) -> Any:
         item = self._node.sdo[entry.index]
         return item[entry.subindex] if entry.subindex else item
+
+
+def _exchanged(exchange: Callable[[], T]) -> T:
+    """Ask or tell once more where the answer is another request's: what `canopen` asks twice is answered twice.
+
+    No motion is begun by SDO.
+    """
+    for _ in range(STALE_ANSWERS):
+        try:
+            return exchange()
+        except SdoCommunicationError as error:
+            if "No SDO response" in str(error):
+                raise
+    return exchange()
