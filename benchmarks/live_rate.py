@@ -61,7 +61,7 @@ def run(*, quick: bool) -> dict[str, float]:
             f"{target.kind}: tracked (1/s)": tracked,
             f"{target.kind}: detect / track at 1080 lines": ours.ratio.median,
             f"{target.kind}: OpenCV / track at 1080 lines": theirs.ratio.median,
-            f"{target.kind}: false locks": float(false_locks),
+            f"{target.kind}: tracked (share)": followed,
         }
     console.print(rows)
     return figures
