@@ -42,8 +42,8 @@ def camera_emulator(driver: str) -> type[CameraEmulator]:
 def _load(kind: DriverKind, driver: str) -> object:
     if driver not in EMULATORS[kind]:
         raise OptionsError(
-            f"there is no emulator for the driver '{driver}' of {kind}: "
-            f"there are some for {', '.join(sorted(EMULATORS[kind]))}"
+            f"there is no emulator for the driver '{driver}' of {kind}, only for "
+            f"{', '.join(sorted(EMULATORS[kind]))}: a profile whose devices are all 'simulated' is served as it is"
         )
     module, _, name = EMULATORS[kind][driver].partition(":")
     return getattr(import_module(module), name)

@@ -133,7 +133,9 @@ async def test_a_device_that_cannot_start_takes_none_of_the_others_along(
 
 
 async def test_a_device_without_an_emulator_is_named(profile: Profile) -> None:
-    with pytest.raises(OptionsError, match=r"no emulator for the driver 'simulated' of controllers"):
+    with pytest.raises(
+        OptionsError, match=r"no emulator for the driver 'simulated' of controllers, .*served as it is"
+    ):
         async with emulated(profile):
             pass
 
