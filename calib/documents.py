@@ -1,12 +1,12 @@
-"""Reading and writing of the two JSON formats: errors that name the field, files that survive a crash."""
+"""Reading and writing of the two JSON formats: errors that name the field."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from calib.durable_files import write_durably
 from calib.errors import FormatError
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -63,21 +63,6 @@ def field_path(location: tuple[int | str, ...]) -> str:
     for step in location:
         path += f"[{step}]" if isinstance(step, int) else f".{step}" if path else step
     return path
-
-
-def write_durably(path: Path, data: bytes) -> None:
-    """Write `data` so that after a crash `path` holds either all of it or what it held before."""
-    temporary = path.with_name(f".{path.name}.tmp")
-    with temporary.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def write_json(path: Path, document: BaseModel) -> None:

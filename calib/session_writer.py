@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.documents import write_durably, write_json
+from calib.documents import write_json
+from calib.durable_files import make_folder_durably, write_durably
 from calib.errors import ImageError
 from calib.session import Session, View, WorldOrigin
 
@@ -20,7 +21,7 @@ class SessionWriter:
 
     def __init__(self, folder: Path, session: Session) -> None:
         """Create `folder` and write `session`, whose pictures, if it has any, are already there."""
-        (folder / "frames").mkdir(parents=True, exist_ok=True)
+        make_folder_durably(folder / "frames")
         self.folder = folder
         self.session = session.at(folder)
         write_json(folder / "session.json", self.session)

@@ -1,0 +1,42 @@
+"""Files that survive a crash of the machine: written beside their place, flushed, renamed, and their folder flushed."""
+
+import os
+from pathlib import Path
+
+
+def write_durably(path: Path, data: bytes) -> None:
+    """Write `data` so that after a crash `path` holds either all of it or what it held before.
+
+    Raises OSError when the disk does not take it; nothing is left of it then.
+    """
+    temporary = path.with_name(f".{path.name}.tmp")
+    try:
+        temporary.write_bytes(data)
+        put_in_place(temporary, path)
+    except BaseException:
+        # What is left of it would only keep a full disk full.
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def put_in_place(written: Path, path: Path) -> None:
+    """Flush the file `written`, which is in the same folder, and let it take the place of `path`."""
+    _flush(written)
+    written.replace(path)
+    _flush(path.parent)
+
+
+def make_folder_durably(folder: Path) -> None:
+    """Make `folder` and those above it that are missing, so that files in them are found after a crash."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        path.mkdir(exist_ok=True)
+        _flush(path.parent)
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
