@@ -2,17 +2,23 @@
 
 import asyncio
 import fcntl
+import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, Any, Self, TypeVar
 
-from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
+from calib.durable_files import make_folder_durably
 from daemon.errors import StoreError
-from daemon.store.tables import SCHEMA_VERSION, Table
+from daemon.store.copies import copy_database
+from daemon.store.migrations import migrate, schema_version
+from daemon.store.tables import Table
+
+logger = logging.getLogger(__name__)
 
 Result = TypeVar("Result")
 
@@ -30,10 +36,10 @@ class Database:
 
     @classmethod
     async def open(cls, folder: Path) -> Self:
-        """Open or create the database in `folder`.
+        """Open or create the database in `folder`; one of an older schema is copied, then brought to today's.
 
         Raises StoreError when the folder cannot be used, another daemon uses it, or the file is of a newer
-        schema.
+        schema, or cannot be brought to today's; it is then as it was.
         """
         database = cls(folder)
         try:
@@ -62,12 +68,11 @@ class Database:
         try:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
         except SQLAlchemyError as error:
-            reason = str(getattr(error, "orig", None) or error).splitlines()[0]
-            raise StoreError(f"{self.path}: the database cannot be used: {reason}") from error
+            raise StoreError(f"{self.path}: the database cannot be used: {_reason_of(error)}") from error
 
     def _open(self) -> None:
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            make_folder_durably(self.folder)
             self._lock = (self.folder / "activecam.lock").open("w")
         except OSError as error:
             raise StoreError(f"{self.folder}: the data folder cannot be used: {error.strerror}") from error
@@ -79,19 +84,38 @@ class Database:
             ) from None
         self._engine = create_engine(f"sqlite:///{self.path}")
         event.listen(self._engine, "connect", _make_durable)
+        event.listen(self._engine, "begin", _begin)
         with self._engine.begin() as connection:
-            self._check_version(connection)
-
-    def _check_version(self, connection: Connection) -> None:
-        version = connection.execute(text("PRAGMA user_version")).scalar_one()
-        if version > SCHEMA_VERSION:
+            version: int = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
+            if version == 0:
+                Table.metadata.create_all(connection)
+                connection.exec_driver_sql(f"PRAGMA user_version = {schema_version()}")
+        if version > schema_version():
             raise StoreError(
                 f"{self.path}: written by a newer activecam (schema {version}, this one knows "
-                f"{SCHEMA_VERSION}): install that version, or choose another --data"
+                f"{schema_version()}): install that version, or choose another --data"
             )
-        if version == 0:
-            Table.metadata.create_all(connection)
-            connection.execute(text(f"PRAGMA user_version = {SCHEMA_VERSION}"))
+        if 0 < version < schema_version():
+            self._migrate(self._engine, version)
+
+    def _migrate(self, engine: Engine, version: int) -> None:
+        copy = self.folder / f"activecam.schema-{version}.db"
+        copy_database(self.path, copy)
+        try:
+            with engine.begin() as connection:
+                migrate(connection, version)
+        except SQLAlchemyError as error:
+            raise StoreError(
+                f"{self.path}: of schema {version}, and could not be brought to schema {schema_version()} "
+                f"({_reason_of(error)}): it is as it was, so go on with the activecam that wrote it, and report this"
+            ) from error
+        logger.warning(
+            "%s was of schema %d and is now of schema %d: %s is how it was",
+            self.path,
+            version,
+            schema_version(),
+            copy,
+        )
 
     def _close(self) -> None:
         if self._engine is not None:
@@ -100,8 +124,19 @@ class Database:
             self._lock.close()
 
 
+def _reason_of(error: SQLAlchemyError) -> str:
+    """Return what SQLite said, without the statement that it said it of."""
+    return str(getattr(error, "orig", None) or error).splitlines()[0]
+
+
 def _make_durable(connection: Any, _record: Any) -> None:
+    # Left to itself, sqlite3 begins no transaction for a change of the tables; see `_begin`.
+    connection.isolation_level = None
     cursor = connection.cursor()
     for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON", "busy_timeout = 5000"):
         cursor.execute(f"PRAGMA {pragma}")
     cursor.close()
+
+
+def _begin(connection: Connection) -> None:
+    connection.exec_driver_sql("BEGIN")

@@ -1,13 +1,9 @@
 """The tables of the database. Times are in UTC; documents are JSON texts, kept as they were written."""
 
 from datetime import UTC, datetime
-from typing import Final
 
 from sqlalchemy import DateTime, Dialect, ForeignKey, Index, Text, TypeDecorator, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
-
-SCHEMA_VERSION: Final = 1
-"""Kept in SQLite's `user_version`: what a migration has to start from."""
 
 
 class UtcDateTime(TypeDecorator[datetime]):

@@ -9,6 +9,7 @@ import pytest
 
 from daemon.errors import StoreError, UnknownCalibrationError, UnknownRunError
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
+from daemon.store.migrations import schema_version
 
 NOW = datetime(2026, 3, 14, 9, 26, 53, 589793, tzinfo=UTC)
 RUN = RunRecord(
@@ -123,7 +124,7 @@ async def test_a_second_daemon_is_kept_out_of_the_folder(tmp_path: Path) -> None
 async def test_a_database_of_a_newer_schema_is_left_alone(tmp_path: Path) -> None:
     await (await Store.open(tmp_path)).close()
     with sqlite3.connect(tmp_path / "activecam.db") as database:
-        assert database.execute("PRAGMA user_version").fetchone() == (1,)
+        assert database.execute("PRAGMA user_version").fetchone() == (schema_version(),)
         assert database.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         database.execute("PRAGMA user_version = 99")
     database.close()

@@ -1,0 +1,36 @@
+"""From the schema of an older activecam to today's, in one transaction: all of it, or nothing.
+
+To change the tables:
+
+1. change `tables`;
+2. append to `MIGRATIONS` a function that does the same to a database that has data in it, by SQL alone: `tables` will
+   change again, and a migration that has been released never does;
+3. `python -m tests.daemon.snapshots` keeps the new schema for the tests, which take every older one there
+   and find what was in it again.
+
+Foreign keys are looked at when all is done. A table that SQLite cannot alter is made anew: create it under another
+name, copy, drop the old one, rename.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from sqlalchemy import Connection
+
+Migration = Callable[[Connection], None]
+
+MIGRATIONS: Final[tuple[Migration, ...]] = ()
+"""The first takes schema 1 to schema 2, and so on."""
+
+
+def schema_version() -> int:
+    """Return the schema that this activecam works with; SQLite keeps it as `user_version`."""
+    return 1 + len(MIGRATIONS)
+
+
+def migrate(connection: Connection, version: int) -> None:
+    """Bring the database from schema `version` to today's, in the transaction that `connection` is in."""
+    connection.exec_driver_sql("PRAGMA defer_foreign_keys = ON")
+    for migration in MIGRATIONS[version - 1 :]:
+        migration(connection)
+    connection.exec_driver_sql(f"PRAGMA user_version = {schema_version()}")
