@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.detection import Detection
+from calib.detection.markers import searches
 from calib.detection.picture import Picture
 from calib.detection.plane import view_of_most
 from calib.detection.tag_corners import measure_tags
@@ -17,8 +18,6 @@ from calib.errors import DetectionError
 from calib.targets import AprilGrid, marker_dictionary, target_points
 
 MISPLACED = 0.25  # of a tag's side in the picture: more than a lens bends a grid
-WINDOWS = ((13, 13), (3, 23))
-"""Widths (px) of the windows whose mean tells black from white, from the least to the most: one is mostly enough."""
 
 
 def detect_aprilgrid(picture: Picture, target: AprilGrid) -> Detection:
@@ -57,9 +56,8 @@ def _seen_tags(picture: Picture, target: AprilGrid) -> _SeenTags:
     known = marker_dictionary(target.dictionary)
     # The others need no names: looking up all of a large dictionary takes longer than all the rest.
     own = cv2.aruco.Dictionary(known.bytesList[:every].copy(), known.markerSize, known.maxCorrectionBits)
-    parameters = cv2.aruco.DetectorParameters()
-    for parameters.adaptiveThreshWinSizeMin, parameters.adaptiveThreshWinSizeMax in WINDOWS:
-        found, numbers, _ = cv2.aruco.ArucoDetector(own, parameters).detectMarkers(picture.grey)
+    for search in searches():
+        found, numbers, _ = cv2.aruco.ArucoDetector(own, search).detectMarkers(picture.grey)
         # OpenCV says None where there is nothing, whatever the annotation says.
         ids = np.array([] if numbers is None else numbers, dtype=np.int64).ravel()
         seen = _in_place(target, ids, np.array(found, dtype=np.float64).reshape(-1, 4, 2))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn_targets import Drawn, draw
+from drawn_targets import Drawn, draw, project
 
 from calib.detection import Detection, detect
 from calib.errors import DetectionError
@@ -152,6 +152,20 @@ def test_a_charuco_board_partly_in_view_gives_the_corners_that_are():
     assert 4 <= len(detection.ids) < len(drawn.points)
     assert np.all(np.diff(detection.ids) > 0)
     assert errors(drawn, CHARUCO, detection).max() < 0.1
+
+
+@pytest.mark.parametrize("square", [(0, 1), (2, 3), (4, 5)], ids=["corner", "middle", "rim"])
+def test_a_charuco_marker_that_is_covered_takes_no_corner_with_it(square):
+    row, column = square
+    drawn = draw(CHARUCO, fill=0.7, noise=2)
+    margin = (CHARUCO.pitch - CHARUCO.marker) / 2
+    ends = np.array([0, CHARUCO.marker]) + margin - CHARUCO.pitch
+    cover = np.array([(x, y) for y in ends for x in ends]) + CHARUCO.pitch * np.array([column, row])
+    left, top, right, bottom = project(drawn.picture_from_world, cover)[[0, 3]].ravel().round().astype(int)
+    drawn.picture[top:bottom, left:right] = 200
+    detection = detect(drawn.picture, CHARUCO)
+    np.testing.assert_array_equal(detection.ids, np.arange(len(drawn.points)))
+    assert errors(drawn, CHARUCO, detection).max() < 0.06
 
 
 def test_tags_partly_in_view_are_numbered_by_their_own_ids():
