@@ -6,7 +6,7 @@ import ipaddress
 import logging
 import signal
 import socket
-from collections.abc import AsyncIterator, Callable, Generator
+from collections.abc import AsyncIterator, Callable, Collection, Generator
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -16,6 +16,7 @@ import uvicorn
 from daemon.errors import ServeError
 from daemon.profile import Profile
 from daemon.service import Service, running_service
+from daemon.tls import Tls
 
 logger = logging.getLogger(__name__)
 
@@ -23,6 +24,8 @@ DEFAULT_HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
 GRACE: Final = 1.0
 """Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
+LARGEST_MESSAGE: Final = 64 * 1024
+"""Bytes of a WebSocket message from a client; none that there is to send has any."""
 
 
 class Server(uvicorn.Server):
@@ -56,17 +59,29 @@ def serve(
     host: str = DEFAULT_HOST,
     port: int = DEFAULT_PORT,
     on_ready: Callable[[str], None] | None = None,
+    *,
+    host_names: Collection[str] = (),
+    tls: Tls | None = None,
 ) -> None:
     """Serve the rig of `profile` until SIGINT or SIGTERM, with what is stored in `data`.
 
     `on_ready` is called with the address (http://host:port) when requests are taken; port 0 takes a free one.
-    Raises ServeError, before anything is opened, when it cannot listen there; StoreError and OptionsError.
+    `host_names` are names, beside `host`, under which clients may ask.
+    Raises ServeError, before anything is opened, when it cannot listen there or the files of `tls` are of no use;
+    StoreError and OptionsError.
     """
+    if tls is not None:
+        tls.check()
     listening = bind(host, port)
     if not ipaddress.ip_address(listening.getsockname()[0]).is_loopback:
         logger.warning("whoever reaches %s can move the axes: nobody is asked who they are", host)
+        if tls is None:
+            logger.warning(
+                "whoever is on the network between can read and change what is sent: "
+                "serve with --tls-certificate and --tls-key"
+            )
     try:
-        asyncio.run(_serve(profile, data, listening, on_ready))
+        asyncio.run(_serve(profile, data, listening, on_ready, {host, *host_names}, tls))
     finally:
         listening.close()
 
@@ -96,7 +111,12 @@ def bind(host: str, port: int) -> socket.socket:
 
 
 async def _serve(
-    profile: Profile, data: Path, listening: socket.socket, on_ready: Callable[[str], None] | None
+    profile: Profile,
+    data: Path,
+    listening: socket.socket,
+    on_ready: Callable[[str], None] | None,
+    host_names: Collection[str],
+    tls: Tls | None,
 ) -> None:
     main = asyncio.current_task()
     assert main is not None
@@ -105,11 +125,14 @@ async def _serve(
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, main.cancel)
     try:
-        async with running_service(profile, data) as service, serving(service, listening) as server:
+        async with (
+            running_service(profile, data) as service,
+            serving(service, listening, host_names, tls) as server,
+        ):
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.add_signal_handler(number, server.handle_exit, number, None)
             if on_ready is not None:
-                on_ready(address_of(listening))
+                on_ready(address_of(listening, tls))
             await server.exit_asked.wait()
     except asyncio.CancelledError:
         logger.info("ended before it was ready")
@@ -119,15 +142,20 @@ async def _serve(
 
 
 @contextlib.asynccontextmanager
-async def serving(service: Service, listening: socket.socket) -> AsyncIterator[Server]:
+async def serving(
+    service: Service, listening: socket.socket, host_names: Collection[str] = (), tls: Tls | None = None
+) -> AsyncIterator[Server]:
     """Answer requests to `service` on a bound socket; on leaving, the axes are stopped before all else."""
     from daemon.api import create_app  # FastAPI takes its time to import, and a port in use needs none of it
 
     config = uvicorn.Config(
-        create_app(service),
+        create_app(service, host_names),
         lifespan="off",
         log_config=None,
         access_log=False,
+        ws_max_size=LARGEST_MESSAGE,
+        ssl_certfile=None if tls is None else tls.certificate,
+        ssl_keyfile=None if tls is None else tls.key,
     )
     server = Server(config, service)
     task = asyncio.create_task(server.serve(sockets=[listening]))
@@ -143,7 +171,10 @@ async def serving(service: Service, listening: socket.socket) -> AsyncIterator[S
         await task
 
 
-def address_of(listening: socket.socket) -> str:
+def address_of(listening: socket.socket, tls: Tls | None = None) -> str:
     """Return the address at which a bound socket is reached."""
+    scheme = "http" if tls is None else "https"
     host, port = listening.getsockname()[:2]
-    return f"http://[{host}]:{port}" if listening.family == socket.AF_INET6 else f"http://{host}:{port}"
+    return (
+        f"{scheme}://[{host}]:{port}" if listening.family == socket.AF_INET6 else f"{scheme}://{host}:{port}"
+    )

@@ -1,5 +1,6 @@
 """The app: every route under /api/v1, described for OpenAPI, with problems for errors."""
 
+from collections.abc import Collection
 from importlib.metadata import version
 from typing import Any, Final
 
@@ -34,7 +35,8 @@ which is stable.
 
 Whatever moves carries the token of the motion lease in the header `X-Lease`; `POST /stop` needs none.
 Whatever changes something is refused to a browser's page of another address (403, `foreign_page`), but for a
-stop; a body of more than 8 MiB is refused everywhere (413, `body_too_large`).
+stop; a body of more than 8 MiB is refused everywhere (413, `body_too_large`), and so is a request under a name
+that the daemon was not told to be known by (421, `host_unknown`).
 """
 
 TAGS: Final = [
@@ -48,8 +50,8 @@ TAGS: Final = [
 ]
 
 
-def create_app(service: Service) -> FastAPI:
-    """Return the ASGI app of `service`, which its caller opens and closes."""
+def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
+    """Return the ASGI app of `service`, which its caller opens and closes; `host_names` as for the `Guard`."""
     app = FastAPI(
         title="activecam",
         version=version("activecam"),
@@ -69,7 +71,7 @@ def create_app(service: Service) -> FastAPI:
     app.include_router(metrics.router)
     app.include_router(reference.router)
     problems.install(app)
-    app.add_middleware(Guard)
+    app.add_middleware(Guard, host_names=host_names)
     _describe_problems(app)
     return app
 

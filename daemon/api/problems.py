@@ -11,6 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field
 from pydantic_core import to_json
 from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
 
 from calib.documents import field_path
 from calib.errors import CalibError, FormatError, ReadingsError
@@ -70,6 +71,7 @@ HTTP_PROBLEMS: Final = {
 }
 BODY_TOO_LARGE: Final = Kind(413, "body_too_large", "The request's body is too large")
 FOREIGN_PAGE: Final = Kind(403, "foreign_page", "A page from elsewhere may not do this")
+HOST_UNKNOWN: Final = Kind(421, "host_unknown", "This daemon is not known by that name")
 INTERNAL: Final = Kind(500, "internal_error", "The daemon has failed")
 
 
@@ -144,8 +146,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _answer_unexpected)
 
 
-def respond(request: Request, kind: Kind, detail: str, headers: Any = None, **more: Any) -> Response:
-    """Return the answer that is a problem document."""
+def respond(request: HTTPConnection, kind: Kind, detail: str, headers: Any = None, **more: Any) -> Response:
+    """Return the answer that is a problem document; to a WebSocket, in place of its acceptance."""
     content = document(kind, detail, request.url.path) | more
     return Response(to_json(content), kind.status, headers, MEDIA_TYPE)
 

@@ -11,6 +11,7 @@ from daemon.cli.console import errors, output
 from daemon.profile import load_profile
 from daemon.server import DEFAULT_HOST, DEFAULT_PORT
 from daemon.server import serve as serve_rig
+from daemon.tls import Tls
 
 
 def register(app: typer.Typer) -> None:
@@ -25,15 +26,25 @@ def serve(
     ),
     host: Annotated[str, typer.Option(help="The address to listen on.")] = DEFAULT_HOST,
     port: Annotated[int, typer.Option(help="The port to listen on; 0 takes a free one.")] = DEFAULT_PORT,
+    host_name: Annotated[
+        list[str] | None, typer.Option(help="A name under which clients may ask; may be given several times.")
+    ] = None,
+    tls_certificate: Annotated[
+        Path | None, typer.Option(help="Serve by HTTPS with this certificate (PEM).")
+    ] = None,
+    tls_key: Annotated[Path | None, typer.Option(help="The certificate's private key (PEM).")] = None,
 ) -> None:
     """Own the rig: move its axes, run calibrations, and answer where the camera is, by HTTP."""
+    if (tls_certificate is None) != (tls_key is None):
+        raise typer.BadParameter("--tls-certificate and --tls-key go together: give both, or neither")
+    tls = None if tls_certificate is None or tls_key is None else Tls(tls_certificate, tls_key)
     rig = load_profile(profile)
     _log_to_stderr()
 
     def ready(address: str) -> None:
         output.print(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)", soft_wrap=True)
 
-    serve_rig(rig, data, host, port, on_ready=ready)
+    serve_rig(rig, data, host, port, ready, host_names=host_name or (), tls=tls)
 
 
 def _log_to_stderr() -> None:

@@ -33,7 +33,7 @@ async def test_a_picture_without_the_target_is_an_answer_too(tmp_path: Path) -> 
     profile = small_rig(tmp_path, look_at=LOOKING_AWAY)
     async with running_service(profile, tmp_path / "data") as service:
         transport = httpx.ASGITransport(create_app(service))
-        async with httpx.AsyncClient(transport=transport, base_url="http://rig/api/v1") as client:
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost/api/v1") as client:
             seen = (await client.get("/camera/detection")).json()
     assert not seen["found"]
     assert "4 x 5 circle grid was not found" in seen["problem"]

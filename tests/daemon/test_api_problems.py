@@ -125,7 +125,7 @@ async def test_a_page_from_elsewhere_changes_nothing_but_may_stop(
     assert service.runs.active is None
     assert (await client.get("/rig", headers=elsewhere)).status_code == 200
     assert (await client.post("/stop", headers=elsewhere)).status_code == 200
-    assert (await client.post("/stop/acknowledge", headers={"Origin": "http://rig"})).status_code == 200
+    assert (await client.post("/stop/acknowledge", headers={"Origin": "http://localhost"})).status_code == 200
 
 
 async def test_an_error_in_the_program_is_logged_and_not_shown(
@@ -136,7 +136,7 @@ async def test_an_error_in_the_program_is_logged_and_not_shown(
 
     monkeypatch.setattr(type(service.poses), "now", broken)
     transport = httpx.ASGITransport(create_app(service), raise_app_exceptions=False)
-    async with httpx.AsyncClient(transport=transport, base_url="http://rig/api/v1") as client:
+    async with httpx.AsyncClient(transport=transport, base_url="http://localhost/api/v1") as client:
         answer = await client.get("/pose")
     assert (answer.status_code, answer.json()["code"]) == (500, "internal_error")
     assert "secret" not in answer.text
@@ -150,10 +150,10 @@ async def test_the_rest_of_the_rig_is_shown(service: Service, client: httpx.Asyn
     assert profile["procedure"]["sweeps"][1]["start"]["slide"] == 50.0
     assert "simulation" not in profile
     assert profile["target"]["kind"] == "circle_grid"
-    metrics = (await client.get("http://rig/metrics")).text
+    metrics = (await client.get("http://localhost/metrics")).text
     assert 'activecam_axis_homed{axis="pan"} 0' in metrics
     await service.rig.home("pan")
-    metrics = (await client.get("http://rig/metrics")).text
+    metrics = (await client.get("http://localhost/metrics")).text
     assert 'activecam_axis_homed{axis="pan"} 1' in metrics
     for line in metrics.splitlines():
         if not line.startswith("#"):

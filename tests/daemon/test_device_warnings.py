@@ -37,7 +37,7 @@ async def test_it_is_in_the_rig_in_the_log_and_in_a_runs_events(
 ) -> None:
     async with running_service(profile, tmp_path / "data", devices) as service:
         transport = httpx.ASGITransport(create_app(service))
-        async with httpx.AsyncClient(transport=transport, base_url="http://rig/api/v1") as client:
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost/api/v1") as client:
             rig = (await client.get("/rig")).json()
         warnings = {device["name"]: device["warnings"] for device in rig["devices"]}
         assert warnings == {"stage": [], "head": [], "main": [SENTENCE]}

@@ -186,8 +186,8 @@ async def test_open_streams_do_not_hold_up_the_end(service: Service) -> None:
 async def test_clients_that_read_nothing_do_not_hold_up_the_end(
     service: Service, caplog: pytest.LogCaptureFixture
 ) -> None:
-    half = b"POST /api/v1/pose HTTP/1.1\r\nHost: rig\r\nContent-Type: application/json\r\nContent-Length: 99\r\n\r\n{"
-    video = b"GET /api/v1/camera/stream.mjpg?fps=60 HTTP/1.1\r\nHost: rig\r\n\r\n"
+    half = b"POST /api/v1/pose HTTP/1.1\r\nHost: [::1]\r\nContent-Type: application/json\r\nContent-Length: 99\r\n\r\n{"
+    video = b"GET /api/v1/camera/stream.mjpg?fps=60 HTTP/1.1\r\nHost: [::1]\r\n\r\n"
     with bind("127.0.0.1", 0) as listening, socket.socket() as sender, socket.socket() as viewer:
         viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
         async with serving(service, listening) as server:

@@ -88,6 +88,7 @@ def test_every_problem_is_on_the_page_with_its_status() -> None:
         problems.INTERNAL,
         problems.BODY_TOO_LARGE,
         problems.FOREIGN_PAGE,
+        problems.HOST_UNKNOWN,
     ]
     text = page(PAGE).partition("\n## Problems\n")[2]
     rows = re.findall(r"^\| `(\w+)` \| (\d+) \|", text, re.MULTILINE)
