@@ -7,17 +7,14 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from calib import Calibration
-from calib.documents import first_problem
-from calib.errors import CalibError, FormatError
+from calib.errors import CalibError
 from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
-from daemon.pose import ActiveCalibration, PoseService
+from daemon.pose import ActiveCalibration, Fallback, PoseService
 from daemon.procedure import RunManager
 from daemon.profile import Profile
 from daemon.rig import Devices, Rig
@@ -37,6 +34,8 @@ class Service:
         self.leases = LeaseDesk()
         self.motions = ClientMotions(rig, self.leases)
         self.poses = PoseService(rig)
+        self.fallback: Fallback | None = None
+        """What the active calibration was found to lack, until another is activated."""
         self.runs = RunManager(rig, self.leases, store, self._use)
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
@@ -52,21 +51,16 @@ class Service:
         """
         prepared = self._prepare(await self.store.calibration(calibration_id))
         record = await self.store.activate(calibration_id)
-        self.poses.activate(prepared)
+        self._take_over(prepared)
         return record
 
     async def restore(self) -> None:
         """Take up what an earlier daemon left: the active calibration, and runs that it did not finish."""
         for run in await self.store.interrupt_unfinished():
             logger.warning("run '%s' was interrupted: %s", run.id, run.error)
-        record = await self.store.active_calibration()
-        if record is None:
-            return
-        try:
-            self.poses.activate(self._prepare(record))
-        except (CalibError, DaemonError) as error:
-            # A rig without a pose can still be calibrated; GET /pose says that nothing is.
-            logger.warning("the active calibration cannot be used: %s", error)
+        self.fallback = await self._take_up_calibration()
+        if self.fallback is not None:
+            logger.warning("%s", self.fallback.sentence)
 
     async def halt(self) -> None:
         """End streams, motions and the run, and return when the axes stand."""
@@ -77,15 +71,35 @@ class Service:
         await self.motions.close()
         self.leases.close()
 
+    @property
+    def problems(self) -> list[str]:
+        """Sentences on whatever keeps the daemon from doing all of its work."""
+        return self.rig.snapshot.problems + ([] if self.fallback is None else [self.fallback.sentence])
+
+    async def _take_up_calibration(self) -> Fallback | None:
+        """Compute poses from the active calibration, or from the newest before it that can be used.
+
+        Which one is active in the store is left alone, so that every start says again what is wrong with it.
+        """
+        reasons: dict[str, str] = {}
+        for calibration_id in await self.store.active_and_earlier():
+            try:
+                self.poses.activate(self._prepare(await self.store.calibration(calibration_id)))
+            except (CalibError, DaemonError) as error:
+                reasons[calibration_id] = str(error)
+            else:
+                return Fallback(reasons, calibration_id) if reasons else None
+        return Fallback(reasons, None) if reasons else None
+
     def _use(self, record: CalibrationRecord, calibration: Calibration) -> None:
-        self.poses.activate(self.poses.prepare(record.id, calibration))
+        self._take_over(self.poses.prepare(record.id, calibration))
+
+    def _take_over(self, prepared: ActiveCalibration) -> None:
+        self.poses.activate(prepared)
+        self.fallback = None
 
     def _prepare(self, record: CalibrationRecord) -> ActiveCalibration:
-        try:
-            calibration = Calibration.model_validate_json(record.document)
-        except ValidationError as error:
-            raise FormatError(f"calibration '{record.id}': {first_problem(error)}") from error
-        return self.poses.prepare(record.id, calibration)
+        return self.poses.prepare(record.id, record.read())
 
 
 @contextlib.asynccontextmanager

@@ -16,6 +16,7 @@ from daemon.errors import (
     StoreError,
     UnknownCalibrationError,
 )
+from daemon.service import Service
 from daemon.store import CalibrationRecord, CalibrationSummary
 
 router = APIRouter(prefix="/calibrations", tags=["calibrations"])
@@ -35,18 +36,22 @@ class CalibrationEntry(BaseModel):
         description="good, usable, poor, or unknown; null where it was not judged.", examples=["good"]
     )
     verdict: str | None = Field(description="What the judgement rests on, in a sentence.")
+    problem: str | None = Field(
+        description="Why poses are not computed from it though it was the active one, or the next in line."
+    )
 
     @classmethod
-    def of(cls, calibration: CalibrationSummary) -> Self:
+    def of(cls, calibration: CalibrationSummary, service: Service) -> Self:
         """Describe a calibration."""
         return cls(
             id=calibration.id,
             created_at=calibration.created_at,
             method=calibration.method,
-            active=calibration.active,
+            active=calibration.id == service.poses.calibration_id,
             run_id=calibration.run_id,
             judgement=calibration.judgement,
             verdict=calibration.verdict,
+            problem=None if service.fallback is None else service.fallback.reasons.get(calibration.id),
         )
 
 
@@ -57,10 +62,10 @@ class CalibrationDocument(CalibrationEntry):
     verification: dict[str, Any] | None = Field(description="What the held-out views of its run said of it.")
 
     @classmethod
-    def whole(cls, record: CalibrationRecord) -> Self:
-        """Describe a calibration with its document."""
+    def whole(cls, record: CalibrationRecord, service: Service) -> Self:
+        """Describe a calibration with its document; raises FormatError where that is damaged."""
         return cls(
-            **CalibrationEntry.of(record.summary()).model_dump(),
+            **CalibrationEntry.of(record.summary(), service).model_dump(),
             calibration=json.loads(record.document),
             verification=None if record.verification is None else json.loads(record.verification),
         )
@@ -69,21 +74,27 @@ class CalibrationDocument(CalibrationEntry):
 @router.get("", summary="All calibrations, the newest first", responses=answers(StoreError))
 async def list_calibrations(service: ServiceDep) -> list[CalibrationEntry]:
     """Answer with what every run has found."""
-    return [CalibrationEntry.of(calibration) for calibration in await service.store.calibrations()]
-
-
-@router.get("/current", summary="The active calibration", responses=answers(NotCalibratedError, StoreError))
-async def get_current_calibration(service: ServiceDep) -> CalibrationDocument:
-    """Answer with the calibration that poses are computed from."""
-    return CalibrationDocument.whole(await service.store.calibration(service.poses.active.id))
+    return [CalibrationEntry.of(calibration, service) for calibration in await service.store.calibrations()]
 
 
 @router.get(
-    "/{calibration_id}", summary="One calibration", responses=answers(UnknownCalibrationError, StoreError)
+    "/current",
+    summary="The active calibration",
+    responses=answers(NotCalibratedError, FormatError, StoreError),
+)
+async def get_current_calibration(service: ServiceDep) -> CalibrationDocument:
+    """Answer with the calibration that poses are computed from."""
+    return CalibrationDocument.whole(await service.store.calibration(service.poses.active.id), service)
+
+
+@router.get(
+    "/{calibration_id}",
+    summary="One calibration",
+    responses=answers(UnknownCalibrationError, FormatError, StoreError),
 )
 async def get_calibration(calibration_id: CalibrationId, service: ServiceDep) -> CalibrationDocument:
     """Answer with a calibration and its document."""
-    return CalibrationDocument.whole(await service.store.calibration(calibration_id))
+    return CalibrationDocument.whole(await service.store.calibration(calibration_id), service)
 
 
 @router.post(
@@ -93,4 +104,4 @@ async def get_calibration(calibration_id: CalibrationId, service: ServiceDep) ->
 )
 async def activate_calibration(calibration_id: CalibrationId, service: ServiceDep) -> CalibrationEntry:
     """Make this calibration the active one, now and after every restart."""
-    return CalibrationEntry.of((await service.activate(calibration_id)).summary())
+    return CalibrationEntry.of((await service.activate(calibration_id)).summary(), service)

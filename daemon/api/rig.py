@@ -21,13 +21,15 @@ class Health(BaseModel):
     status: Literal["ok", "degraded"]
     version: str = Field(examples=["0.1.0"])
     started_at: datetime
-    problems: list[str] = Field(description="Sentences on every device that is lost or in fault.")
+    problems: list[str] = Field(
+        description="Sentences on every device that is lost or in fault, and on a calibration that cannot be used."
+    )
 
 
 @router.get("/health", tags=["rig"], summary="Whether the daemon can do its work")
 async def get_health(service: ServiceDep) -> Health:
-    """Answer as soon as the daemon serves; `degraded` while a device is lost or in fault."""
-    problems = service.rig.snapshot.problems
+    """Answer as soon as the daemon serves; `degraded` while there are problems."""
+    problems = service.problems
     status: Literal["ok", "degraded"] = "degraded" if problems else "ok"
     return Health(status=status, version=service.version, started_at=service.started_at, problems=problems)
 

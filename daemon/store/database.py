@@ -69,6 +69,8 @@ class Database:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
         except SQLAlchemyError as error:
             raise StoreError(f"{self.path}: the database cannot be used: {_reason_of(error)}") from error
+        except ValueError as error:
+            raise StoreError(f"{self.path}: a record in the database is damaged: {error}") from error
 
     def _open(self) -> None:
         try:

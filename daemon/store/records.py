@@ -1,9 +1,14 @@
 """What the store gives out: records that no longer touch the database."""
 
-import json
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
+
+from pydantic import ValidationError
+
+from calib import Calibration
+from calib.documents import first_problem
+from calib.errors import FormatError
 
 
 class RunState(StrEnum):
@@ -70,15 +75,22 @@ class CalibrationRecord(StoredCalibration):
     verification: str | None = None
     """What the held-out views said (JSON), None where there were none."""
 
+    def read(self) -> Calibration:
+        """Return the calibration; raises FormatError where its document is damaged."""
+        try:
+            return Calibration.model_validate_json(self.document)
+        except ValidationError as error:
+            raise FormatError(f"calibration '{self.id}' is damaged: {first_problem(error)}") from error
+
     def summary(self) -> CalibrationSummary:
-        """Return it without its document."""
-        quality = json.loads(self.document).get("quality", {})
+        """Return it without its document; raises FormatError where that is damaged."""
+        quality = self.read().quality
         return CalibrationSummary(
             self.id,
             self.created_at,
             self.method,
             self.active,
             self.run_id,
-            quality.get("judgement"),
-            quality.get("verdict"),
+            quality.judgement,
+            quality.verdict,
         )

@@ -111,14 +111,17 @@ class Store:
             lambda session: _calibration(_find_calibration(session, calibration_id))
         )
 
-    async def active_calibration(self) -> CalibrationRecord | None:
-        """Return the calibration that poses are computed from, None where there is none."""
-
-        def work(session: Session) -> CalibrationRecord | None:
-            row = session.scalars(select(CalibrationRow).where(CalibrationRow.active)).one_or_none()
-            return None if row is None else _calibration(row)
-
-        return await self._database.transact(work)
+    async def active_and_earlier(self) -> Sequence[str]:
+        """Return the ids of the active calibration and of those made before it, the newest first; or none at all."""
+        made = select(CalibrationRow.created_at).where(CalibrationRow.active).scalar_subquery()
+        ids = (
+            select(CalibrationRow.id)
+            .where(CalibrationRow.created_at <= made)
+            .order_by(
+                CalibrationRow.active.desc(), CalibrationRow.created_at.desc(), CalibrationRow.id.desc()
+            )
+        )
+        return await self._database.transact(lambda session: session.scalars(ids).all())
 
     async def activate(self, calibration_id: str) -> CalibrationRecord:
         """Make one calibration the active one; raises UnknownCalibrationError."""

@@ -54,8 +54,7 @@ async def test_what_an_older_version_left_is_there(tmp_path: Path, version: int)
     assert runs["b02d77"].session == "sessions/20260314-102653-b02d77"
     assert [run.id for run in await store.interrupt_unfinished()] == [runs["2c6f95"].id]
 
-    active = await store.active_calibration()
-    assert active is not None
+    active = await store.calibration((await store.active_and_earlier())[0])
     assert (active.id, active.run_id) == (runs["b02d77"].calibration_id, runs["b02d77"].id)
     assert active.verification is not None
     calibrations = [await store.calibration(entry.id) for entry in await store.calibrations()]
