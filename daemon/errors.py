@@ -23,6 +23,10 @@
     │   └── UnknownCameraError (KeyError)      no camera of this name in the calibration
     ├── StoreError                             the database or its folder cannot be used
     │   └── UnknownCalibrationError (KeyError) no calibration of this id
+    ├── IdempotencyError
+    │   ├── IdempotencyConflictError           this key was another request's
+    │   ├── IdempotencyInProgressError         the first request of this key is still under way
+    │   └── IdempotencyUnknownError            how the first request of this key ended is not known
     ├── PrintError                             a target that cannot be drawn as large, or as finely, as asked
     └── ServeError                             the address cannot be served
 
@@ -124,6 +128,22 @@ class StoreError(DaemonError):
 
 class UnknownCalibrationError(StoreError, KeyError):
     """There is no calibration of this id."""
+
+
+class IdempotencyError(DaemonError):
+    """A request cannot be answered as it was the first time."""
+
+
+class IdempotencyConflictError(IdempotencyError):
+    """Another request was sent with this key."""
+
+
+class IdempotencyInProgressError(IdempotencyError):
+    """The request of this key is still being carried out."""
+
+
+class IdempotencyUnknownError(IdempotencyError):
+    """The request of this key was begun, and the daemon ended before it was answered."""
 
 
 class PrintError(DaemonError):

@@ -11,6 +11,7 @@ from calib import Calibration
 from calib.errors import CalibError
 from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError
+from daemon.idempotency import AnswersGiven
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
@@ -40,6 +41,7 @@ class Service:
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
         self.streams = Streams()
+        self.answers = AnswersGiven(store.answers)
         self.started_at = datetime.now(UTC)
         self.version = version("activecam")
 
@@ -56,6 +58,7 @@ class Service:
 
     async def restore(self) -> None:
         """Take up what an earlier daemon left: the active calibration, and runs that it did not finish."""
+        await self.answers.restore()
         for run in await self.store.interrupt_unfinished():
             logger.warning("run '%s' was interrupted: %s", run.id, run.error)
         self.fallback = await self._take_up_calibration()

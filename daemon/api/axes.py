@@ -8,6 +8,7 @@ from pydantic import Field
 
 from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import LeaseDep, ServiceDep
+from daemon.api.once import KEYED, ONCE, OnceRoute
 from daemon.api.problems import answers
 from daemon.api.rig_documents import AxisDocument
 from daemon.errors import (
@@ -31,7 +32,7 @@ from drivers.errors import (
     NotHomedError,
 )
 
-router = APIRouter(prefix="/axes", tags=["motion"])
+router = APIRouter(prefix="/axes", tags=["motion"], route_class=OnceRoute)
 
 AxisName = Annotated[str, Path(description="The axis's name in the profile.", examples=["pan"])]
 Wait = Annotated[bool, Query(description="Answer 200 when the motion has ended, rather than 202 at once.")]
@@ -52,6 +53,7 @@ MOTION = {
         LimitError,
         DeviceLostError,
         DeviceTimeoutError,
+        *KEYED,
     ),
     200: {"description": "With `wait=true`: the motion has ended at its target, where the axis stands."},
     202: {"description": "The motion has begun.", "model": AxisDocument},
@@ -77,7 +79,10 @@ class CombinedMove(RequestBody):
 
 
 @router.post(
-    "/move", summary="Move several axes at once", responses=MOTION | {202: {"model": list[AxisDocument]}}
+    "/move",
+    summary="Move several axes at once",
+    responses=MOTION | {202: {"model": list[AxisDocument]}},
+    dependencies=[ONCE],
 )
 async def move_axes(
     request: CombinedMove, lease: LeaseDep, service: ServiceDep, response: Response, wait: Wait = False
@@ -88,7 +93,7 @@ async def move_axes(
     return [AxisDocument.of(service.rig.axis(name)) for name in request.targets]
 
 
-@router.post("/{name}/home", summary="Home an axis", responses=MOTION)
+@router.post("/{name}/home", summary="Home an axis", responses=MOTION, dependencies=[ONCE])
 async def home_axis(
     name: AxisName, lease: LeaseDep, service: ServiceDep, response: Response, wait: Wait = False
 ) -> AxisDocument:
@@ -98,7 +103,7 @@ async def home_axis(
     return AxisDocument.of(service.rig.axis(name))
 
 
-@router.post("/{name}/move", summary="Move an axis to a position", responses=MOTION)
+@router.post("/{name}/move", summary="Move an axis to a position", responses=MOTION, dependencies=[ONCE])
 async def move_axis(
     name: AxisName,
     request: Move,
@@ -114,7 +119,7 @@ async def move_axis(
     return AxisDocument.of(service.rig.axis(name))
 
 
-@router.post("/{name}/jog", summary="Move an axis by a distance", responses=MOTION)
+@router.post("/{name}/jog", summary="Move an axis by a distance", responses=MOTION, dependencies=[ONCE])
 async def jog_axis(
     name: AxisName, request: Jog, lease: LeaseDep, service: ServiceDep, response: Response, wait: Wait = False
 ) -> AxisDocument:

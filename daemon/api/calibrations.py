@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 
 from calib.errors import FormatError
 from daemon.api.dependencies import ServiceDep
+from daemon.api.once import KEYED, ONCE_DURABLY, OnceRoute
 from daemon.api.problems import answers
 from daemon.errors import (
     CalibrationMismatchError,
@@ -19,7 +20,7 @@ from daemon.errors import (
 from daemon.service import Service
 from daemon.store import CalibrationRecord, CalibrationSummary
 
-router = APIRouter(prefix="/calibrations", tags=["calibrations"])
+router = APIRouter(prefix="/calibrations", tags=["calibrations"], route_class=OnceRoute)
 
 CalibrationId = Annotated[str, Path(description="The calibration's id.")]
 
@@ -100,7 +101,8 @@ async def get_calibration(calibration_id: CalibrationId, service: ServiceDep) ->
 @router.post(
     "/{calibration_id}/activate",
     summary="Compute poses from this calibration",
-    responses=answers(UnknownCalibrationError, CalibrationMismatchError, FormatError, StoreError),
+    responses=answers(UnknownCalibrationError, CalibrationMismatchError, FormatError, StoreError, *KEYED),
+    dependencies=[ONCE_DURABLY],
 )
 async def activate_calibration(calibration_id: CalibrationId, service: ServiceDep) -> CalibrationEntry:
     """Make this calibration the active one, now and after every restart."""

@@ -8,10 +8,11 @@ from pydantic import BaseModel, Field
 
 from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import LeaseDep, LeaseToken, ServiceDep
+from daemon.api.once import KEYED, ONCE, OnceRoute
 from daemon.api.problems import answers
 from daemon.errors import LeaseEndedError, LeaseHeldError, LeaseRequiredError
 
-router = APIRouter(prefix="/lease", tags=["lease"])
+router = APIRouter(prefix="/lease", tags=["lease"], route_class=OnceRoute)
 
 
 class LeaseRequest(RequestBody):
@@ -33,7 +34,12 @@ class LeaseDocument(BaseModel):
     expires_at: datetime
 
 
-@router.post("", summary="Take or renew the motion lease", responses=answers(LeaseHeldError))
+@router.post(
+    "",
+    summary="Take or renew the motion lease",
+    responses=answers(LeaseHeldError, *KEYED),
+    dependencies=[ONCE],
+)
 async def acquire_lease(
     request: LeaseRequest, service: ServiceDep, token: LeaseToken = None
 ) -> LeaseDocument:
@@ -50,7 +56,8 @@ async def acquire_lease(
     "",
     status_code=204,
     summary="Give the motion lease back",
-    responses=answers(LeaseRequiredError, LeaseEndedError, LeaseHeldError),
+    responses=answers(LeaseRequiredError, LeaseEndedError, LeaseHeldError, *KEYED),
+    dependencies=[ONCE],
 )
 async def release_lease(lease: LeaseDep, service: ServiceDep) -> Response:
     """End the lease, and stop what its holder has set in motion."""

@@ -61,6 +61,13 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
     daemon.LensUnknownError: Kind(409, "lens_unknown", "The camera's lens is not known"),
     daemon.UnknownCameraError: Kind(404, "unknown_camera", "There is no such camera"),
     daemon.UnknownCalibrationError: Kind(404, "unknown_calibration", "There is no such calibration"),
+    daemon.IdempotencyConflictError: Kind(422, "idempotency_conflict", "The key was another request's"),
+    daemon.IdempotencyInProgressError: Kind(
+        409, "idempotency_in_progress", "The first request of this key is under way"
+    ),
+    daemon.IdempotencyUnknownError: Kind(
+        409, "idempotency_unknown", "How the first request of this key ended is not known"
+    ),
     daemon.StoreError: Kind(503, "store_unavailable", "The database cannot be used"),
 }
 INVALID: Final = Kind(422, "invalid_request", "The request is not what this address takes")
@@ -144,6 +151,17 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
     app.add_exception_handler(Exception, _answer_unexpected)
+
+
+async def answer(request: Request, error: Exception) -> Response:
+    """Return what `error` is answered with."""
+    if isinstance(error, RequestValidationError):
+        return await _answer_invalid(request, error)
+    if isinstance(error, HTTPException):
+        return await _answer_http(request, error)
+    if isinstance(error, drivers.DriverError | CalibError | daemon.DaemonError):
+        return await _answer_known(request, error)
+    return await _answer_unexpected(request, error)
 
 
 def respond(request: HTTPConnection, kind: Kind, detail: str, headers: Any = None, **more: Any) -> Response:

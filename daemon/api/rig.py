@@ -7,12 +7,13 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from daemon.api.dependencies import ServiceDep
+from daemon.api.once import KEYED, ONCE, OnceRoute
 from daemon.api.problems import answers
 from daemon.api.rig_documents import RigDocument, StopDocument
 from daemon.errors import StandstillError
 from daemon.profile_document import ProfileDocument
 
-router = APIRouter()
+router = APIRouter(route_class=OnceRoute)
 
 
 class Health(BaseModel):
@@ -56,7 +57,13 @@ async def stop(service: ServiceDep) -> StopDocument:
     return StopDocument.of(service.rig.latch)
 
 
-@router.post("/stop/acknowledge", tags=["motion"], summary="Allow motion again after a stop")
+@router.post(
+    "/stop/acknowledge",
+    tags=["motion"],
+    summary="Allow motion again after a stop",
+    responses=answers(*KEYED),
+    dependencies=[ONCE],
+)
 async def acknowledge_stop(service: ServiceDep) -> StopDocument:
     """Release the latch; nothing moves by that. Harmless where nothing is latched."""
     service.rig.acknowledge_stop()

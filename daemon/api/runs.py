@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 
 from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import LeaseToken, ServiceDep
+from daemon.api.once import KEYED, ONCE_DURABLY, OnceRoute
 from daemon.api.problems import answers
 from daemon.errors import (
     LeaseHeldError,
@@ -23,7 +24,7 @@ from daemon.errors import (
 from daemon.procedure import RunEvent
 from daemon.store import RunRecord, RunState
 
-router = APIRouter(prefix="/runs", tags=["runs"])
+router = APIRouter(prefix="/runs", tags=["runs"], route_class=OnceRoute)
 
 RunId = Annotated[str, Path(description="The run's id.", examples=["20260314-092653-5f3a1c"])]
 
@@ -79,8 +80,9 @@ async def list_runs(service: ServiceDep) -> list[RunDocument]:
     status_code=202,
     summary="Start the profile's procedure",
     responses=answers(
-        RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError, StoreError
+        RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError, StoreError, *KEYED
     ),
+    dependencies=[ONCE_DURABLY],
 )
 async def start_run(
     http: Request,
@@ -123,7 +125,8 @@ async def pause_run(run_id: RunId, service: ServiceDep) -> RunDocument:
     "/{run_id}/resume",
     status_code=202,
     summary="Resume a paused run",
-    responses=answers(UnknownRunError, RunStateError, StopLatchedError, StoreError),
+    responses=answers(UnknownRunError, RunStateError, StopLatchedError, StoreError, *KEYED),
+    dependencies=[ONCE_DURABLY],
 )
 async def resume_run(run_id: RunId, service: ServiceDep) -> RunDocument:
     """Let the run go on from where it rests."""

@@ -19,7 +19,15 @@ from sqlalchemy import Connection
 
 Migration = Callable[[Connection], None]
 
-MIGRATIONS: Final[tuple[Migration, ...]] = ()
+
+def _add_answers(connection: Connection) -> None:
+    connection.exec_driver_sql(
+        "CREATE TABLE answers (key TEXT NOT NULL, fingerprint TEXT NOT NULL, asked_at DATETIME NOT NULL, "
+        "status INTEGER, media_type TEXT, body BLOB, location TEXT, PRIMARY KEY (key))"
+    )
+
+
+MIGRATIONS: Final[tuple[Migration, ...]] = (_add_answers,)
 """The first takes schema 1 to schema 2, and so on."""
 
 

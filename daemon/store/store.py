@@ -9,6 +9,7 @@ from sqlalchemy import ColumnElement, case, func, select, update
 from sqlalchemy.orm import Session
 
 from daemon.errors import UnknownCalibrationError, UnknownRunError
+from daemon.store.answers import StoredAnswers
 from daemon.store.database import Database
 from daemon.store.records import CalibrationRecord, CalibrationSummary, RunRecord, RunState
 from daemon.store.tables import CalibrationRow, RunRow
@@ -19,6 +20,7 @@ class Store:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        self.answers = StoredAnswers(database)
 
     @classmethod
     async def open(cls, folder: Path) -> Self:

@@ -48,6 +48,21 @@ class RunRow(Table):
     calibration_id: Mapped[str | None] = mapped_column(ForeignKey("calibrations.id"))
 
 
+class AnswerRow(Table):
+    """What a request with an idempotency key was answered; without a status, it was not answered yet."""
+
+    __tablename__ = "answers"
+
+    key: Mapped[str] = mapped_column(primary_key=True)
+    fingerprint: Mapped[str]
+    """A hash of what tells the request from others."""
+    asked_at: Mapped[datetime]
+    status: Mapped[int | None]
+    media_type: Mapped[str | None]
+    body: Mapped[bytes | None]
+    location: Mapped[str | None]
+
+
 class CalibrationRow(Table):
     """A calibration; its document is never changed."""
 

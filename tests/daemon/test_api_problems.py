@@ -25,6 +25,7 @@ INSIDE = {
     daemon.LeaseError,
     daemon.RunError,
     daemon.PoseError,
+    daemon.IdempotencyError,
     daemon.TargetUnseenError,  # ends a run, whose `error` it becomes
     daemon.ServeError,  # there is nobody yet to answer
     daemon.PrintError,  # the command line alone prints
