@@ -198,6 +198,8 @@ class View(Document):
     camera: str | None = None
     use: Literal["fit", "verify"] = "fit"
     approached: list[Literal[-1, 0, 1]] | None = None
+    sweep: Annotated[int, Field(ge=0)] | None = None
+    """Which sweep of a run's procedure took it, from 0; its free views count as the last."""
 
     @property
     def frames(self) -> list[str]:
@@ -279,6 +281,10 @@ class Session(Document):
     origin: WorldOrigin | None = None
     complete: bool = True
     """False while a run adds views, and ever after it was cut off: then it is solved as far as it goes."""
+    sweeps_done: Annotated[int, Field(ge=0)] = 0
+    """How many sweeps of a run's procedure are finished: it is resumed after them."""
+    set_aside: list[View] = Field(default_factory=list)
+    """Views of a sweep that was cut off, which the run took again when it was resumed; they are not used."""
 
     _folder: Path = PrivateAttr(default=Path())
 

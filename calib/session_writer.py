@@ -1,8 +1,10 @@
 """Writing a session view by view, so that a crash loses at most the view in flight."""
 
 from collections.abc import Sequence
+from itertools import compress
+from operator import not_
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from calib.documents import write_json
 from calib.durable_files import make_folder_durably, write_durably
 from calib.errors import ImageError
-from calib.session import Session, View, WorldOrigin
+from calib.session import Session, View, WorldOrigin, load_session
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -26,18 +28,41 @@ class SessionWriter:
         self.session = session.at(folder)
         write_json(folder / "session.json", self.session)
 
+    @classmethod
+    def resume(cls, folder: Path) -> Self:
+        """Go on with the session in `folder` after the last sweep that was finished; later views are set aside.
+
+        Raises FormatError where it cannot be read, and ImageError where a picture of a view that is kept is gone.
+        """
+        session = load_session(folder)
+        if session.complete:
+            return cls(folder, session)
+        done = [view.sweep is not None and view.sweep < session.sweeps_done for view in session.views]
+        kept = list(compress(session.views, done))
+        cut_off = list(compress(session.views, map(not_, done)))
+        for name in (name for view in kept for name in view.frames):
+            if not (folder / name).is_file():
+                raise ImageError(f"{folder / name}: the picture of a view is gone: start a new run")
+        set_aside = [*session.set_aside, *cut_off]
+        return cls(folder, session.model_copy(update={"views": kept, "set_aside": set_aside}))
+
     def add(self, view: View) -> View:
         """Put one more view on disk, which carries its points or pose itself, and return it."""
-        grown = self.session.with_views([*self.session.views, view])
-        write_json(self.folder / "session.json", grown)
-        self.session = grown
+        self._change(views=[*self.session.views, view])
         return view
+
+    def end_sweep(self) -> None:
+        """Say on disk that every view of one more sweep has been taken."""
+        self._change(sweeps_done=self.session.sweeps_done + 1)
 
     def complete(self) -> None:
         """Say on disk that every planned view has been taken."""
-        done = self.session.model_copy(update={"complete": True}).at(self.folder)
-        write_json(self.folder / "session.json", done)
-        self.session = done
+        self._change(complete=True)
+
+    def _change(self, **fields: Any) -> None:
+        changed = self.session.model_copy(update=fields).at(self.folder)
+        write_json(self.folder / "session.json", changed)
+        self.session = changed
 
     def add_pictures(self, pictures: Sequence[Picture], **fields: Any) -> View:
         """Put one more view on disk, its `pictures` (one or more) first; `fields` are its keys beside them.
@@ -45,7 +70,7 @@ class SessionWriter:
         Raises ImageError for a picture that cannot be stored and OSError when the disk does not take it; the
         session is then as it was.
         """
-        number = len(self.session.views)
+        number = len(self.session.views) + len(self.session.set_aside)  # whose pictures stay
         names = [f"frames/{number:04d}{f'-{frame}' if frame else ''}.png" for frame in range(len(pictures))]
         if len(names) > 1:
             fields["images"] = names

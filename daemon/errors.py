@@ -14,6 +14,7 @@
     │   ├── UnknownRunError (KeyError)         no run of this id
     │   ├── RunActiveError                     one run at a time, and one is under way
     │   ├── RunStateError                      the run is not in a state in which this can be asked
+    │   ├── ProfileChangedError                the run was taken with another profile than the rig's
     │   └── TargetUnseenError                  the views that a run got are too few to go on
     ├── PoseError
     │   ├── NotCalibratedError                 no calibration is active
@@ -92,6 +93,10 @@ class RunActiveError(RunError):
 
 class RunStateError(RunError):
     """The run is over, or already in the state that was asked for."""
+
+
+class ProfileChangedError(RunError):
+    """A run cannot be resumed with another profile than it was begun with."""
 
 
 class TargetUnseenError(RunError):

@@ -55,6 +55,7 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
     daemon.UnknownRunError: Kind(404, "unknown_run", "There is no such run"),
     daemon.RunActiveError: Kind(409, "run_active", "A run is under way"),
     daemon.RunStateError: Kind(409, "run_state", "The run's state does not allow this"),
+    daemon.ProfileChangedError: Kind(409, "profile_changed", "The run was taken with another profile"),
     daemon.NotCalibratedError: Kind(409, "not_calibrated", "Nothing is calibrated"),
     daemon.CalibrationMismatchError: Kind(409, "calibration_mismatch", "The calibration is of another rig"),
     daemon.StaleReadingError: Kind(503, "reading_stale", "The latest reading is too old"),

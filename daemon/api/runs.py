@@ -14,6 +14,7 @@ from daemon.api.once import KEYED, ONCE_DURABLY, OnceRoute
 from daemon.api.problems import answers
 from daemon.errors import (
     LeaseHeldError,
+    ProfileChangedError,
     RigFaultError,
     RunActiveError,
     RunStateError,
@@ -124,15 +125,42 @@ async def pause_run(run_id: RunId, service: ServiceDep) -> RunDocument:
 @router.post(
     "/{run_id}/resume",
     status_code=202,
-    summary="Resume a paused run",
-    responses=answers(UnknownRunError, RunStateError, StopLatchedError, StoreError, *KEYED),
+    summary="Resume a run",
+    responses=answers(
+        UnknownRunError,
+        RunActiveError,
+        RunStateError,
+        ProfileChangedError,
+        StopLatchedError,
+        RigFaultError,
+        LeaseHeldError,
+        StoreError,
+        *KEYED,
+    ),
     dependencies=[ONCE_DURABLY],
 )
-async def resume_run(run_id: RunId, service: ServiceDep) -> RunDocument:
-    """Let the run go on from where it rests."""
-    run = await service.runs.get(run_id)
-    service.runs.resume(run_id)
-    return RunDocument.of(run)
+async def resume_run(run_id: RunId, service: ServiceDep, token: LeaseToken = None) -> RunDocument:
+    """Let a paused run go on from where it rests, or take up one that ended before its time.
+
+    One that was interrupted, failed or cancelled homes all axes and goes on after the last sweep that it had
+    finished; views of the next one are set aside and taken again. It takes the lease as a new run does.
+    """
+    return RunDocument.of(await service.runs.resume(run_id, token))
+
+
+@router.post(
+    "/{run_id}/solve",
+    status_code=202,
+    summary="Solve what a run has measured",
+    responses=answers(UnknownRunError, RunActiveError, RunStateError, StoreError, *KEYED),
+    dependencies=[ONCE_DURABLY],
+)
+async def solve_run(run_id: RunId, service: ServiceDep) -> RunDocument:
+    """Solve the views of a run that was interrupted, failed or cancelled, as far as they go.
+
+    Nothing moves. The run keeps its state; `calibration_id` is what was found, which is stored and not activated.
+    """
+    return RunDocument.of(await service.runs.solve(run_id))
 
 
 @router.post(

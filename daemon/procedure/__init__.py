@@ -4,6 +4,7 @@ In the order in which a run goes:
 
     manager       one run at a time, under its own lease
     run           its states, from its start to its last word;  gate  where it waits while paused
+    assignment    what it has to do: measure and solve, or solve what there is
     survey        homing, sweeps and free views;  observation  one view
     conclusion    solving and verification;  worker  a thread for them that can be abandoned
     events        what it tells;  event_log  told in order, kept, followed

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from calib import Calibration, load_session
+from calib.session import Session
 from calib.session_writer import keep_origin
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Solved, Solving, Verified
@@ -60,7 +61,8 @@ def _solve(folder: Path, tell: Callable[[str], None]) -> Calibration:
 
     session = load_session(folder)
     calibration = solve(session, progress=tell)
-    keep_origin(session, calibration.origin)
+    if _of_all_joints(calibration, session):
+        keep_origin(session, calibration.origin)
     return calibration
 
 
@@ -70,4 +72,11 @@ def _verify(calibration: Calibration, folder: Path) -> dict[str, Any] | None:
     session = load_session(folder)
     if all(view.use == "fit" for view in session.views):
         return None  # views of the fit would flatter it
+    if not _of_all_joints(calibration, session):
+        return None  # it cannot tell where the camera was
     return asdict(verify(calibration, session))
+
+
+def _of_all_joints(calibration: Calibration, session: Session) -> bool:
+    """Return whether the session was cut off only after it had exercised every joint."""
+    return len(calibration.joints) == len(session.joints)

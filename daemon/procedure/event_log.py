@@ -1,13 +1,16 @@
 """A run's events in order: kept, written beside its session, and followed by any number of readers."""
 
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
+from typing import Self
 
 from pydantic import ValidationError
 
+from calib.durable_files import make_folder_durably, write_durably
 from daemon.broadcast import Broadcast
-from daemon.procedure.events import EVENT, RunEvent
+from daemon.procedure.events import EVENT, Finished, RunEvent
+from daemon.store import RunRecord
 
 logger = logging.getLogger(__name__)
 
@@ -15,14 +18,24 @@ FILE_NAME = "events.jsonl"
 
 
 class EventLog:
-    """The events of the run `run_id`; `folder` is its session's."""
+    """The events of the run `run_id`; `folder` is its session's. `earlier` are those that it goes on from."""
 
-    def __init__(self, run_id: str, folder: Path) -> None:
+    def __init__(self, run_id: str, folder: Path, earlier: Sequence[RunEvent] = ()) -> None:
         self.run_id = run_id
-        self._events: list[RunEvent] = []
+        self._events = list(earlier)
         self._file = folder / FILE_NAME
         self._changed = Broadcast()
         self._ended = False
+
+    @classmethod
+    def reopen(cls, run: RunRecord, folder: Path) -> Self:
+        """Go on with the events of a run that is over; raises OSError."""
+        earlier = past_events(run, folder)
+        # The last line may be cut off, and an end may be missing that readers were told of.
+        lines = "".join(event.model_dump_json() + "\n" for event in earlier)
+        make_folder_durably(folder)
+        write_durably(folder / FILE_NAME, lines.encode())
+        return cls(run.id, folder, earlier)
 
     def add(self, event: RunEvent) -> None:
         """Tell an event under the next number; what a solver says of a run that is over is dropped."""
@@ -48,6 +61,22 @@ class EventLog:
             if self._ended:
                 return
             await self._changed.wait()
+
+
+def past_events(run: RunRecord, folder: Path) -> list[RunEvent]:
+    """Return the events of a run that is over, with an end even if its daemon was killed before it told one."""
+    events = read_events(folder)
+    if not events or events[-1].type != "finished":
+        end = Finished(
+            run_id=run.id,
+            sequence=len(events) + 1,
+            time=run.ended_at or run.created_at,
+            state=run.state,
+            error=run.error,
+            calibration_id=run.calibration_id,
+        )
+        events.append(end)
+    return events
 
 
 def read_events(folder: Path) -> list[RunEvent]:

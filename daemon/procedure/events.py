@@ -21,7 +21,7 @@ class Event(BaseModel):
 
 
 class StateChanged(Event):
-    """The run was started, paused or resumed."""
+    """The run was started, paused or resumed, or is solved as it is."""
 
     type: Literal["state"] = "state"
     state: RunState
@@ -32,6 +32,7 @@ class Planned(Event):
 
     type: Literal["plan"] = "plan"
     views: Annotated[int, Field(description="Pictures to take in all.")]
+    done: Annotated[int, Field(description="How many of them an earlier part of a resumed run took.")] = 0
     joints: Annotated[list[str], Field(description="The joints, in the order of their sweeps.")]
 
 
@@ -105,7 +106,7 @@ class Verified(Event):
 
 
 class Finished(Event):
-    """The last event of every run."""
+    """The run has come to its end; a run that is resumed or solved goes on, and has another."""
 
     type: Literal["finished"] = "finished"
     state: RunState

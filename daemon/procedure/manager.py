@@ -1,15 +1,18 @@
 """The runs of a rig: one at a time, each under a lease of its own."""
 
 import asyncio
+import json
 import secrets
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from calib import Calibration
-from daemon.errors import RigFaultError, RunActiveError, RunStateError
-from daemon.lease import LeaseDesk
-from daemon.procedure.event_log import read_events
-from daemon.procedure.events import Finished, RunEvent
+from daemon.errors import ProfileChangedError, RigFaultError, RunActiveError, RunStateError, StoreError
+from daemon.lease import Lease, LeaseDesk
+from daemon.procedure.assignment import Assignment, Calibrate, Solve
+from daemon.procedure.event_log import EventLog, past_events
+from daemon.procedure.events import RunEvent
 from daemon.procedure.run import Run
 from daemon.profile_document import ProfileDocument
 from daemon.rig import Rig
@@ -49,24 +52,45 @@ class RunManager:
         async with self._starting:
             self._require_able()
             record = self._new_record(owner, note)
-            lease = self._leases.hand_over(f"run {record.id}", note, token)
-            try:
+            folder = self._store.session_folder(record)
+
+            async def take_up() -> EventLog:
                 await self._store.add_run(record)
-            except BaseException:
-                self._leases.release(lease.token)
-                raise
-            self._latest = Run(record, self._rig, self._store, self._end_of(lease.token))
-            self._latest.start()
-            return record
+                return EventLog(record.id, folder)
+
+            return await self._begin(record, Calibrate(self._rig, folder), take_up, token)
+
+    async def resume(self, run_id: str, token: str | None = None) -> RunRecord:
+        """Let a paused run go on; take up one that ended before its time after the last sweep that it finished.
+
+        `token` shows the lease of who asks, if there is one. Raises UnknownRunError, ProfileChangedError and what
+        `start` raises.
+        """
+        if self.active is not None and self.active.record.id == run_id:
+            self._rig.latch.require_free()
+            self.active.resume()
+            return self.active.record
+        async with self._starting:
+            before = await self._require_unfinished(run_id)
+            self._require_able()
+            self._require_same_profile(before)
+            assignment = Calibrate(self._rig, self._store.session_folder(before))
+            return await self._begin(before, assignment, lambda: self._take_up(before), token)
+
+    async def solve(self, run_id: str) -> RunRecord:
+        """Solve what a run has measured that ended before its time; its calibration is stored and not activated.
+
+        Raises UnknownRunError, RunActiveError, RunStateError and StoreError.
+        """
+        async with self._starting:
+            before = await self._require_unfinished(run_id)
+            self._require_free()
+            assignment = Solve(before, self._store.session_folder(before))
+            return await self._begin(before, assignment, lambda: self._take_up(before))
 
     def pause(self, run_id: str) -> None:
         """Let a run come to rest after the view in flight; raises RunStateError."""
         self._require_active(run_id).pause()
-
-    def resume(self, run_id: str) -> None:
-        """Let a paused run go on; raises RunStateError, StopLatchedError."""
-        self._rig.latch.require_free()
-        self._require_active(run_id).resume()
 
     async def cancel(self, run_id: str) -> RunRecord:
         """End a run, and return when its axes stand; raises RunStateError."""
@@ -102,10 +126,7 @@ class RunManager:
                 yield event
             return
         record = await self._store.run(run_id)
-        events = await asyncio.to_thread(read_events, self._store.session_folder(record))
-        if not events or events[-1].type != "finished":
-            events.append(_missing_end(record, len(events) + 1))
-        for event in events:
+        for event in await asyncio.to_thread(past_events, record, self._store.session_folder(record)):
             if event.sequence > after:
                 yield event
 
@@ -115,24 +136,74 @@ class RunManager:
         if self.active is not None:
             await self.active.end(
                 RunState.INTERRUPTED,
-                "the daemon was shut down: the views taken so far can be solved as they are",
+                "the daemon was shut down: resume it, or solve the views taken so far as they are",
             )
+
+    async def _begin(
+        self,
+        record: RunRecord,
+        assignment: Assignment,
+        take_up: Callable[[], Awaitable[EventLog]],
+        token: str | None = None,
+    ) -> RunRecord:
+        """Start a run, under a lease of its own where it moves, once `take_up` has stored that it is under way."""
+        lease = self._leases.hand_over(f"run {record.id}", record.note, token) if assignment.moves else None
+        try:
+            log = await take_up()
+        except BaseException:
+            if lease is not None:
+                self._leases.release(lease.token)
+            raise
+        running = replace(record, state=RunState.RUNNING, ended_at=None, error=None)
+        self._latest = Run(running, assignment, log, self._store, self._end_of(lease))
+        self._latest.start()
+        return running
+
+    async def _take_up(self, before: RunRecord) -> EventLog:
+        """Store that a run is under way again, and return its events so far."""
+        folder = self._store.session_folder(before)
+        try:
+            log = await asyncio.to_thread(EventLog.reopen, before, folder)
+        except OSError as error:
+            raise StoreError(f"{folder}: the run's events cannot be written: {error.strerror}") from error
+        await self._store.change_run(before.id, RunState.RUNNING)
+        return log
 
     def _stop(self, reason: str) -> None:
         # Whatever it is doing: a run that only found out at its next motion would go on once the stop is
         # acknowledged.
-        if self.active is not None:
+        if self.active is not None and self.active.assignment.moves:
             self.active.break_off(RunState.FAILED, f"a stop ended it: {reason}")
 
     def _require_able(self) -> None:
-        if self._closed:
-            raise RunStateError("no run can be started any more: the daemon is shutting down")
-        if self.active is not None:
-            raise RunActiveError(f"run '{self.active.record.id}' is under way: wait for it, or cancel it")
+        self._require_free()
         self._rig.latch.require_free()
         problems = self._rig.snapshot.problems
         if problems:
             raise RigFaultError(f"no run can be started: {'; '.join(problems)}")
+
+    def _require_free(self) -> None:
+        if self._closed:
+            raise RunStateError("no run can be started any more: the daemon is shutting down")
+        if self.active is not None:
+            raise RunActiveError(f"run '{self.active.record.id}' is under way: wait for it, or cancel it")
+
+    async def _require_unfinished(self, run_id: str) -> RunRecord:
+        """Return a run that is over and has not succeeded; raises UnknownRunError, RunStateError and StoreError."""
+        record = await self.get(run_id)
+        if record.state is RunState.SUCCEEDED:
+            raise RunStateError(f"run '{run_id}' has succeeded: start another")
+        return record
+
+    def _require_same_profile(self, record: RunRecord) -> None:
+        then = json.loads(record.profile)
+        now = ProfileDocument.of(self._rig.profile).model_dump(mode="json")
+        changed = [key for key, value in now.items() if then.get(key) != value]
+        if changed:
+            raise ProfileChangedError(
+                f"run '{record.id}' was taken with another profile ({', '.join(changed)}): "
+                "serve that one to resume it, or start another run"
+            )
 
     def _require_active(self, run_id: str) -> Run:
         run = self.active
@@ -156,22 +227,11 @@ class RunManager:
             started_at=now,
         )
 
-    def _end_of(self, token: str) -> Callable[[CalibrationRecord | None, Calibration | None], None]:
+    def _end_of(self, lease: Lease | None) -> Callable[[CalibrationRecord | None, Calibration | None], None]:
         def end(record: CalibrationRecord | None, calibration: Calibration | None) -> None:
-            if record is not None and calibration is not None:
+            if record is not None and record.active and calibration is not None:
                 self._activate(record, calibration)
-            self._leases.release(token)
+            if lease is not None:
+                self._leases.release(lease.token)
 
         return end
-
-
-def _missing_end(record: RunRecord, sequence: int) -> Finished:
-    """Return the last event of a run whose daemon was killed before it could tell it."""
-    return Finished(
-        run_id=record.id,
-        sequence=sequence,
-        time=record.ended_at or record.created_at,
-        state=record.state,
-        error=record.error,
-        calibration_id=record.calibration_id,
-    )

@@ -10,14 +10,12 @@ from uuid import uuid4
 from calib import Calibration
 from calib.documents import write_json
 from calib.errors import CalibError
-from calib.session_writer import SessionWriter
 from daemon.errors import DaemonError, RunStateError, StandstillError
-from daemon.procedure.conclusion import Conclusion, conclude
+from daemon.procedure.assignment import Assignment
+from daemon.procedure.conclusion import Conclusion
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Finished, StateChanged
 from daemon.procedure.gate import Gate
-from daemon.procedure.survey import Survey
-from daemon.rig import Rig
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
 from drivers.cancellation import finish
 from drivers.errors import DriverError
@@ -34,11 +32,13 @@ class Run:
     says that they could not be. `on_end` is called between the two, with what a run that succeeded has found.
     """
 
-    def __init__(self, record: RunRecord, rig: Rig, store: Store, on_end: OnEnd) -> None:
+    def __init__(
+        self, record: RunRecord, assignment: Assignment, log: EventLog, store: Store, on_end: OnEnd
+    ) -> None:
         self.record = record
         self.folder = store.session_folder(record)
-        self.log = EventLog(record.id, self.folder)
-        self._rig = rig
+        self.log = log
+        self.assignment = assignment
         self._store = store
         self._on_end = on_end
         self._gate = Gate()
@@ -83,7 +83,7 @@ class Run:
         state, error, conclusion = RunState.SUCCEEDED, None, None
         try:
             if self._ending is None:
-                conclusion = await self._work()
+                conclusion = await self.assignment.work(self.log, self._checkpoint)
         except asyncio.CancelledError:
             state, error = RunState.CANCELLED, "it was cancelled"
         except (DaemonError, DriverError, CalibError) as failure:
@@ -97,15 +97,6 @@ class Run:
             # Whatever it was that the breaking off made go wrong.
             state, error = self._ending
         await finish(self._conclude(state, error, conclusion))
-
-    async def _work(self) -> Conclusion:
-        empty = self._rig.profile.empty_session()
-        writer = await finish(asyncio.to_thread(SessionWriter, self.folder, empty))
-        self.log.add(StateChanged(state=RunState.RUNNING))
-        # What the starter had in motion ended with the lease that was handed over, and may still be braking.
-        await self._rig.stop_axes(list(self._rig.specs))
-        await Survey(self._rig, writer, self.log, self._checkpoint).take()
-        return await conclude(self.folder, self.log)
 
     async def _checkpoint(self) -> None:
         if not self._gate.closed:
@@ -122,35 +113,40 @@ class Run:
         """Make sure that the axes stand, store the end, and tell it."""
         if state is not RunState.SUCCEEDED:
             try:
-                await self._rig.stop_axes(list(self._rig.specs))
+                await self.assignment.halt()
             except StandstillError as unconfirmed:
                 error = f"{error}; {unconfirmed}"
+        state, error = self.assignment.end(state, error)
         kept: CalibrationRecord | None = None
         try:
-            kept = None if conclusion is None else await self._keep(conclusion)
+            kept = None if conclusion is None else await self._keep(conclusion, state)
             self.record = await self._store.change_run(self.record.id, state, error, calibration=kept)
         except (DaemonError, OSError) as failure:
             unstored = f"its end could not be stored: {failure}"
             kept, error = None, unstored if error is None else f"{error}; {unstored}"
             self.record = replace(self.record, state=RunState.FAILED, error=error, ended_at=datetime.now(UTC))
-        if error is not None:
+        if kept is None or conclusion is None:
             logger.warning("run '%s' %s: %s", self.record.id, self.record.state, error)
-        elif conclusion is not None:
-            logger.info("run '%s' succeeded: %s", self.record.id, conclusion.calibration.quality.verdict)
+        else:
+            solved = "succeeded" if kept.active else "was solved as it is"
+            logger.info("run '%s' %s: %s", self.record.id, solved, conclusion.calibration.quality.verdict)
         self._on_end(kept, None if conclusion is None else conclusion.calibration)
         self.log.add(
             Finished(state=self.record.state, error=error, calibration_id=self.record.calibration_id)
         )
 
-    async def _keep(self, conclusion: Conclusion) -> CalibrationRecord:
-        """Write the calibration beside its session, and return the record that goes into the store."""
+    async def _keep(self, conclusion: Conclusion, state: RunState) -> CalibrationRecord:
+        """Write the calibration beside its session, and return the record that goes into the store.
+
+        It is to be used where the run has succeeded; one of a run that was cut off is for a person to judge.
+        """
         calibration = conclusion.calibration
         await asyncio.to_thread(write_json, self.folder / "calibration.json", calibration)
         return CalibrationRecord(
             id=uuid4().hex,
             created_at=datetime.now(UTC),
             method=calibration.method,
-            active=True,
+            active=state is RunState.SUCCEEDED,
             run_id=self.record.id,
             document=calibration.model_dump_json(exclude_unset=True),
             verification=conclusion.verification_json(),

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from calib.errors import CalibError, DetectionError
 from calib.observations import Observation as ViewObservation
-from calib.observations import observed_in
+from calib.observations import observe, observed_in
 from calib.second_look import partly_seen
 from calib.session import Session
 from calib.session_writer import Picture, SessionWriter
@@ -28,7 +28,11 @@ Checkpoint = Callable[[], Awaitable[None]]
 
 
 class Survey:
-    """Takes all views of the profile's procedure. `checkpoint` is awaited before each position."""
+    """Takes the views of the profile's procedure that the session lacks.
+
+    A session that has views already goes on after its last finished sweep, once all axes have been homed anew.
+    `checkpoint` is awaited before each position.
+    """
 
     def __init__(self, rig: Rig, writer: SessionWriter, log: EventLog, checkpoint: Checkpoint) -> None:
         self._rig = rig
@@ -39,31 +43,37 @@ class Survey:
         self._procedure = rig.profile.procedure
         self._positions = sum(1 for _ in self._procedure.planned_views())
         self._position = 0
+        self._resumed = bool(writer.session.views or writer.session.set_aside)
+        self._forgotten = bool(writer.session.views)  # what an earlier part of the run saw
         self._told: set[str] = set()  # the kinds of faults that were told of in this sweep
         self._seen: list[ViewObservation] = []
         self._unseen: list[_Unseen] = []
 
     async def take(self) -> None:
-        """Home what is not homed, then take every view.
+        """Home what is not homed, then take every view that is missing.
 
         Raises TargetUnseenError when a sweep is in vain, OSError when the disk does not take a view, and what
         the devices raise.
         """
-        joints = list(dict.fromkeys(sweep.joint for sweep in self._procedure.sweeps))
-        self._log.add(Planned(views=self._positions, joints=joints))
+        procedure, done = self._procedure, self._writer.session.sweeps_done
+        joints = list(dict.fromkeys(sweep.joint for sweep in procedure.sweeps))
+        self._position = sum(len(sweep.readings) for sweep in procedure.sweeps[:done])
+        self._log.add(Planned(views=self._positions, joints=joints, done=self._position))
         for device in self._rig.snapshot.devices:
             for warning in device.warnings:
                 self._log.add(Warned(message=warning))
         await self._home()
-        for sweep in self._procedure.sweeps:
+        for sweep in procedure.sweeps[done:]:
             await self._sweep(sweep)
-        if self._procedure.views:
-            await self._free_views(self._procedure.views)
+            await finish(asyncio.to_thread(self._writer.end_sweep))
+        if procedure.views:
+            await self._free_views(procedure.views)
         await finish(asyncio.to_thread(self._writer.complete))
 
     async def _home(self) -> None:
         for name in self._rig.specs:
-            if not self._rig.axis(name).homed:
+            # What an axis says of itself may have changed with whatever cut the run off.
+            if self._resumed or not self._rig.axis(name).homed:
                 await self._checkpoint()
                 self._log.add(Homing(axis=name))
                 await self._rig.home(name)
@@ -118,6 +128,9 @@ class Survey:
 
         A grid without numbers that is partly out of the picture is not found otherwise.
         """
+        if self._unseen and self._forgotten:
+            self._seen = await asyncio.to_thread(_observed_on_disk, self._writer.session)
+            self._forgotten = False
         count, found = 0, True
         while found:
             found = False
@@ -157,7 +170,12 @@ class Survey:
 
     async def _store(self, observation: Observation, spot: "_Spot") -> None:
         taken, detection = observation.taken, observation.seen.detection
-        fields: dict[str, Any] = {"joint": spot.joint, "use": spot.use, **taken.view_fields()}
+        fields: dict[str, Any] = {
+            "joint": spot.joint,
+            "use": spot.use,
+            "sweep": self._writer.session.sweeps_done,
+            **taken.view_fields(),
+        }
         pictures = [cast("Picture", frame.image) for frame in taken.frames]  # a camera's are 8 or 16 bits
         # Finished even when cancelled, so that what the writer holds is what is on disk.
         view = await finish(asyncio.to_thread(self._writer.add_pictures, pictures, **fields))
@@ -195,6 +213,14 @@ class _Unseen:
     spot: _Spot
     taken: Taken
     problem: str
+
+
+def _observed_on_disk(session: Session) -> list[ViewObservation]:
+    """Return what is seen in the pictures of all views, those of an earlier part of the run among them."""
+    try:
+        return observe(session).observations
+    except CalibError:
+        return []
 
 
 def _where_predicted(taken: Taken, session: Session, seen: list[ViewObservation]) -> Observation:

@@ -45,7 +45,7 @@ class Store:
                 row.state, row.ended_at = RunState.INTERRUPTED, now
                 row.error = (
                     "the daemon ended while this run was under way: "
-                    "the views taken so far can be solved as they are"
+                    "resume it, or solve the views taken so far as they are"
                 )
             return [_run(row) for row in rows]
 
@@ -68,14 +68,14 @@ class Store:
         *,
         calibration: CalibrationRecord | None = None,
     ) -> RunRecord:
-        """Move a run to `state`; a `calibration` is stored and activated in the same transaction."""
+        """Move a run to `state`; a `calibration` is stored, and activated if it says so, in the same transaction."""
 
         def work(session: Session) -> RunRecord:
             row = _find_run(session, run_id)
             row.state, row.error = state.value, error
             row.ended_at = datetime.now(UTC) if state.over else None
             if calibration is not None:
-                _add_active(session, calibration)
+                _add(session, calibration)
                 row.calibration_id = calibration.id
             return _run(row)
 
@@ -144,10 +144,11 @@ def _of_document(path: str) -> ColumnElement[str | None]:
     return case((func.json_valid(document) == 1, func.json_extract(document, path)), else_=None)
 
 
-def _add_active(session: Session, calibration: CalibrationRecord) -> None:
-    _deactivate_all(session)
+def _add(session: Session, calibration: CalibrationRecord) -> None:
+    if calibration.active:
+        _deactivate_all(session)
     fields = {name: getattr(calibration, name) for name in CalibrationRecord.__dataclass_fields__}
-    session.add(CalibrationRow(**fields | {"active": True}))
+    session.add(CalibrationRow(**fields))
     session.flush()  # before the run that refers to it
 
 

@@ -53,7 +53,7 @@ def change(data: Path, calibration: str, document: str) -> None:
 
 async def asked(service: Service, address: str, method: str = "GET") -> Any:
     transport = httpx.ASGITransport(create_app(service))
-    async with httpx.AsyncClient(transport=transport, base_url="http://rig/api/v1") as client:
+    async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1/api/v1") as client:
         return (await client.request(method, address)).json()
 
 

@@ -141,9 +141,9 @@ async def test_a_paused_run_rests_between_two_views_and_goes_on(service: Service
         if event.type == "state" and event.state is RunState.PAUSED:
             assert (await service.store.run(run.id)).state is RunState.PAUSED
             assert not service.rig.snapshot.moving
-            service.runs.resume(run.id)
+            await service.runs.resume(run.id)
             with pytest.raises(RunStateError, match="not paused"):
-                service.runs.resume(run.id)
+                await service.runs.resume(run.id)
     assert [event.state for event in of(seen, "state")] == ["running", "paused", "running"]
     # At most the view in flight came between the asking and the rest.
     assert seen.index(of(seen, "state")[1]) - seen.index(of(seen, "view")[1]) <= 3

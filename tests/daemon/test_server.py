@@ -293,7 +293,7 @@ def test_a_killed_daemon_loses_at_most_the_view_in_flight(tmp_path: Path) -> Non
     with daemon(profile, data) as (process, client):
         found = client.get(f"/runs/{run}").json()
         assert found["state"] == "interrupted"
-        assert "can be solved" in found["error"]
+        assert "resume it" in found["error"]
         assert client.get("/calibrations/current").json()["id"] == calibration
         assert client.get("/pose").json()["code"] == "not_homed"
         assert client.get(f"/runs/{first}").json()["state"] == "succeeded"

@@ -89,7 +89,7 @@ async def test_a_run_that_an_earlier_daemon_left_is_interrupted(tmp_path: Path, 
     (run,) = await store.interrupt_unfinished()
     assert run == await store.run(RUN.id)
     assert run.state is RunState.INTERRUPTED
-    assert "can be solved" in (run.error or "")
+    assert "resume it" in (run.error or "")
     await store.close()
 
 

@@ -1,0 +1,93 @@
+"""What a run is to do: measure and solve, or solve what an earlier run has measured."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Protocol
+
+from calib.session_writer import SessionWriter
+from daemon.procedure.conclusion import Conclusion, conclude
+from daemon.procedure.event_log import EventLog
+from daemon.procedure.events import StateChanged
+from daemon.procedure.survey import Survey
+from daemon.rig import Rig
+from daemon.store import RunRecord, RunState
+from drivers.cancellation import finish
+
+Checkpoint = Callable[[], Awaitable[None]]
+End = tuple[RunState, str | None]
+
+UNSOLVED = "; its views could not be solved: "
+
+
+class Assignment(Protocol):
+    """What a run does between its first and its last event."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves axes: under a lease of its own, and ended by a stop."""
+
+    async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:
+        """Do it; raises errors of the project's trees and OSError."""
+
+    async def halt(self) -> None:
+        """Return when whatever it moved is confirmed to stand; raises StandstillError."""
+
+    def end(self, state: RunState, error: str | None) -> End:
+        """Return how a run ends whose work ended so."""
+
+
+class Calibrate:
+    """Take the views that the session in `folder` lacks, and solve it; its calibration is to be used."""
+
+    moves = True
+
+    def __init__(self, rig: Rig, folder: Path) -> None:
+        self._rig = rig
+        self._folder = folder
+
+    async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:
+        """Measure and solve."""
+        writer = await finish(asyncio.to_thread(self._writer))
+        log.add(StateChanged(state=RunState.RUNNING))
+        # What the starter had in motion ended with the lease that was handed over, and may still be braking.
+        await self._rig.stop_axes(list(self._rig.specs))
+        if not writer.session.complete:
+            await Survey(self._rig, writer, log, checkpoint).take()
+        return await conclude(self._folder, log)
+
+    async def halt(self) -> None:
+        """Stop all axes."""
+        await self._rig.stop_axes(list(self._rig.specs))
+
+    def end(self, state: RunState, error: str | None) -> End:
+        """End as the work did."""
+        return state, error
+
+    def _writer(self) -> SessionWriter:
+        if (self._folder / "session.json").exists():
+            return SessionWriter.resume(self._folder)
+        return SessionWriter(self._folder, self._rig.profile.empty_session())
+
+
+class Solve:
+    """Solve the session in `folder` as it is. The run ended before its time, and that stays so."""
+
+    moves = False
+
+    def __init__(self, before: RunRecord, folder: Path) -> None:
+        self._before = before
+        self._folder = folder
+
+    async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:  # noqa: ARG002
+        """Solve."""
+        log.add(StateChanged(state=RunState.RUNNING))
+        return await conclude(self._folder, log)
+
+    async def halt(self) -> None:
+        """Leave the axes to whoever moves them."""
+
+    def end(self, state: RunState, error: str | None) -> End:
+        """End as the run did before."""
+        why = (self._before.error or "").partition(UNSOLVED)[0]
+        return self._before.state, why if state is RunState.SUCCEEDED else f"{why}{UNSOLVED}{error}"
