@@ -175,19 +175,24 @@ class Calibration(Document):
         return self.chain.poses(values, self._links[index], mount)
 
     def pose_covariance(
-        self, readings: ArrayLike, camera: str | None = None, approached: ArrayLike | None = None
+        self,
+        readings: ArrayLike,
+        camera: str | None = None,
+        approached: ArrayLike | None = None,
+        reading_std: ArrayLike | None = None,
     ) -> NDArray[np.float64] | None:
         """Return the poses' covariances (n, 6, 6) at `readings` (n, m), or (6, 6) for one vector; None if unknown.
 
         Rotation (rad) then position (m), in the camera's frame. Of a joint with backlash whose side of approach is not
-        known, half its play to either side is added. Raises as `world_from_camera` does.
+        known, half its play to either side is added; `reading_std` (n, m) or (m,), 0 by default, is how unsure the
+        readings themselves are, in their own units. Raises as `world_from_camera` does.
         """
         index = self.camera_index(camera)
         known, mount = self._twist_covariances[index], self._mounts[index]
         if known is None or mount is None:
             return None
         values = self.chain.checked(readings)
-        covariances = self._pose_terms(index, mount, values, approached).covariances(known)
+        covariances = self._pose_terms(index, mount, values, approached, reading_std).covariances(known)
         return covariances if values.ndim == 2 else np.asarray(covariances[0])
 
     def project(
@@ -272,13 +277,15 @@ class Calibration(Document):
         mount: NDArray[np.float64],
         values: NDArray[np.float64],
         approached: ArrayLike | None,
+        reading_std: ArrayLike | None = None,
     ) -> PoseTerms:
         rows, corrections = np.atleast_2d(values), self._joint_corrections
         sides = checked_sides(approached, rows)
+        std = corrections.unknown_side_std(sides)
         corrected = CorrectedReadings(
             corrections.applied(rows, sides),
             corrections.regressors(rows, sides),
-            corrections.unknown_side_std(sides),
+            std if reading_std is None else np.hypot(std, np.asarray(reading_std, dtype=float)),
         )
         return pose_terms(self.chain, mount, self._links[index], corrected)
 

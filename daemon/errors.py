@@ -5,6 +5,7 @@
     │   ├── UnknownAxisError (KeyError)        no axis of this name
     │   ├── StopLatchedError                   a stop has not been acknowledged: nothing may move
     │   ├── RigFaultError                      the rig is in fault: a run cannot start
+    │   ├── TimeNotCoveredError                there are no readings of that time
     │   └── StandstillError                    axes that could not be confirmed to stand
     ├── LeaseError
     │   ├── LeaseRequiredError                 a motion asked without a lease
@@ -57,6 +58,10 @@ class StopLatchedError(RigError):
 
 class RigFaultError(RigError):
     """A device is lost or in fault, so that a run cannot be started."""
+
+
+class TimeNotCoveredError(RigError):
+    """There are no readings around the time that was asked for: it is to come, too long ago, or in a gap."""
 
 
 class StandstillError(RigError):

@@ -43,6 +43,34 @@ class Pose(PoseAtReadings):
     age_s: float = Field(description="How long ago that was (s).")
 
 
+class PoseAtPastTime(PoseAtReadings):
+    """The camera's pose at a past time, at readings interpolated between the two around it."""
+
+    timestamp: datetime = Field(description="The time that was asked for.")
+    between: list[Annotated[list[datetime], Field(min_length=2, max_length=2)]] = Field(
+        description="For each axis, when the two readings were taken; twice the same for one taken just then."
+    )
+    reading_bounds: list[float] = Field(
+        description="How far each reading may be off by interpolation, in its own unit; in the covariance."
+    )
+    moving: bool = Field(description="Whether an axis was moving then.")
+
+
+class PoseAtTime(PoseAtPastTime):
+    """One of them, with what it is of."""
+
+    calibration_id: str
+    camera: str
+
+
+class PosesAtTimes(BaseModel):
+    """One pose for each time, in the order of the request."""
+
+    calibration_id: str
+    camera: str
+    poses: list[PoseAtPastTime]
+
+
 class PosesAtReadings(BaseModel):
     """One pose for each vector of readings, in the order of the request."""
 

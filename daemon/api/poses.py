@@ -1,20 +1,28 @@
 """Routes of the camera's pose, and of what it sees where."""
 
 import asyncio
-from typing import Annotated, Any, Literal
+from datetime import datetime
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from fastapi import APIRouter, Request, Response
+from fastapi.exceptions import RequestValidationError
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import AwareDatetime, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import to_json
 
 from calib.errors import ReadingsError
 from daemon.api.bodies import RequestBody
 from daemon.api.dependencies import ServiceDep
-from daemon.api.pose_documents import Pixels, Pose, PosesAtReadings, Rays
+from daemon.api.pose_documents import Pixels, Pose, PoseAtTime, PosesAtReadings, PosesAtTimes, Rays
 from daemon.api.problems import answers
-from daemon.errors import LensUnknownError, NotCalibratedError, StaleReadingError, UnknownCameraError
+from daemon.errors import (
+    LensUnknownError,
+    NotCalibratedError,
+    StaleReadingError,
+    TimeNotCoveredError,
+    UnknownCameraError,
+)
 from daemon.pose.pixels import project, rays
 from daemon.service import Service
 from drivers.errors import DeviceLostError, NotHomedError
@@ -29,6 +37,16 @@ Readings = Annotated[
         max_length=10_000,
         description="Vectors of raw joint readings in chain order, each in its axis's own unit.",
         examples=[[[12.5, 30.0]]],
+    ),
+]
+Time = Annotated[AwareDatetime, Field(strict=False)]
+Times = Annotated[
+    list[Time],
+    Field(
+        min_length=1,
+        max_length=1_000,
+        description="Past times (RFC 3339), such as those of another camera's pictures.",
+        examples=[["2026-03-14T09:27:12.732569Z"]],
     ),
 ]
 FewReadings = Annotated[
@@ -46,16 +64,27 @@ Sides = Annotated[
 ]
 CameraName = Annotated[str | None, Field(description="The camera; the first where left out.")]
 
+_TIME: TypeAdapter[datetime] = TypeAdapter(AwareDatetime)
+
 SMALL = 64
 """Vectors of readings that are computed at once; more go to a worker thread, so that others need not wait."""
 
 
 class PosesRequest(RequestBody):
-    """Where the camera would be."""
+    """Readings at which the camera would be, or past times at which it was: one of both."""
 
-    readings: Readings
+    readings: Readings | None = None
     approached: Sides = None
+    times: Times | None = None
     camera: CameraName = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.readings is None) == (self.times is None):
+            raise ValueError("give either readings or times")
+        if self.approached is not None and self.readings is None:
+            raise ValueError("approached goes with readings; of past times it is known")
+        return self
 
 
 class ProjectRequest(RequestBody):
@@ -80,40 +109,63 @@ class RaysRequest(RequestBody):
     camera: CameraName = None
 
 
+def _query(name: str, schema: dict[str, str], description: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "in": "query",
+        "required": False,
+        "schema": {"type": "string"} | schema,
+        "description": description,
+    }
+
+
 @router.get(
     "/pose",
-    summary="The camera's pose now",
-    response_model=Pose,
+    summary="The camera's pose now, or at a past time",
+    response_model=Pose | PoseAtTime,
     responses=answers(
-        NotCalibratedError, NotHomedError, UnknownCameraError, DeviceLostError, StaleReadingError
+        NotCalibratedError,
+        NotHomedError,
+        UnknownCameraError,
+        TimeNotCoveredError,
+        DeviceLostError,
+        StaleReadingError,
     ),
     openapi_extra={
         "parameters": [
-            {
-                "name": "camera",
-                "in": "query",
-                "required": False,
-                "schema": {"type": "string"},
-                "description": "The camera; the first where left out.",
-            }
+            _query("camera", {}, "The camera; the first where left out."),
+            _query("at", {"format": "date-time"}, "A time of the last minute; now where left out."),
         ]
     },
 )
 async def get_pose(request: Request) -> Response:
-    """Answer from the latest readings and the active calibration, without touching hardware."""
+    """Answer from the latest readings, or those around a past time, and the active calibration."""
     # The hot path: nothing is resolved, validated or serialised that need not be.
     service: Service = request.app.state.service
-    return _json(service.poses.now(request.query_params.get("camera")))
+    asked = request.query_params
+    if "at" in asked:
+        return _json(await service.poses.past(_time(asked["at"]), asked.get("camera")))
+    return _json(service.poses.now(asked.get("camera")))
 
 
 @router.post(
     "/pose",
-    summary="Poses at given readings",
-    response_model=PosesAtReadings,
-    responses=answers(NotCalibratedError, UnknownCameraError, ReadingsError),
+    summary="Poses at given readings, or at past times",
+    response_model=PosesAtReadings | PosesAtTimes,
+    responses=answers(
+        NotCalibratedError,
+        UnknownCameraError,
+        ReadingsError,
+        TimeNotCoveredError,
+        DeviceLostError,
+        StaleReadingError,
+    ),
 )
 async def get_poses(request: PosesRequest, service: ServiceDep) -> Response:
-    """Answer with one pose for each vector of readings; moves nothing."""
+    """Answer with one pose for each vector of readings, or for each time; moves nothing."""
+    if request.times is not None:
+        return _json(await service.poses.past_list(request.times, request.camera))
+    assert request.readings is not None
     readings = _vectors(service, request.readings)
     sides = None if request.approached is None else _sides(request.approached, readings)
     if len(readings) <= SMALL:
@@ -170,6 +222,16 @@ async def pixel_rays(request: RaysRequest, service: ServiceDep) -> Response:
             }
         )
     )
+
+
+def _time(text: str) -> datetime:
+    """Return the time that a query states; raises RequestValidationError."""
+    try:
+        return _TIME.validate_python(text)
+    except ValidationError as error:
+        raise RequestValidationError(
+            [{**wrong, "loc": ("query", "at")} for wrong in error.errors()]
+        ) from None
 
 
 def _readings(

@@ -48,6 +48,7 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
     daemon.UnknownAxisError: Kind(404, "unknown_axis", "There is no such axis"),
     daemon.StopLatchedError: Kind(409, "stop_latched", "A stop waits to be acknowledged"),
     daemon.RigFaultError: Kind(409, "rig_fault", "The rig is in fault"),
+    daemon.TimeNotCoveredError: Kind(404, "time_not_covered", "There are no readings of that time"),
     daemon.StandstillError: Kind(503, "standstill_unconfirmed", "A standstill could not be confirmed"),
     daemon.LeaseRequiredError: Kind(401, "lease_required", "Moving needs the motion lease"),
     daemon.LeaseEndedError: Kind(403, "lease_ended", "The lease is over"),

@@ -71,8 +71,16 @@ class ActiveCalibration:
             raise LensUnknownError(f"the active calibration does not know the lens of camera '{known}'")
         return lens
 
-    def poses(self, readings: Array, camera: str | None, approached: ArrayLike | None = None) -> Poses:
+    def poses(
+        self,
+        readings: Array,
+        camera: str | None,
+        approached: ArrayLike | None = None,
+        reading_std: ArrayLike | None = None,
+    ) -> Poses:
         """Return the camera's poses at `readings` (n, m), each `approached` from a side (n, m), none known by default.
+
+        `reading_std` (n, m) is how unsure the readings are, in their own units; 0 by default.
 
         Raises UnknownCameraError, and ReadingsError for readings or sides of the wrong number, or readings too large.
         """
@@ -88,11 +96,12 @@ class ActiveCalibration:
             world_from_camera,
             self.base_from_world @ world_from_camera,
             quaternions(world_from_camera[:, :3, :3]),
-            self.calibration.pose_covariance(readings, name, sides),
+            self.calibration.pose_covariance(readings, name, sides, reading_std),
             self._out_of_range(readings),
         )
 
     def _out_of_range(self, readings: Array) -> list[list[str]]:
-        beyond = (readings < self.low) | (readings > self.high)
-        names = [joint.name for joint in self.calibration.joints]
-        return [[name for name, out in zip(names, row, strict=True) if out] for row in beyond]
+        beyond: list[list[str]] = [[] for _ in readings]
+        for row, joint in np.argwhere((readings < self.low) | (readings > self.high)):
+            beyond[row].append(self.calibration.joints[joint].name)
+        return beyond

@@ -1,7 +1,10 @@
-"""The camera's pose, now and at given readings: from the rig's snapshot and the active calibration alone."""
+"""The camera's pose, now, at a past time and at given readings: from what has been read and the active calibration."""
 
+import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +14,9 @@ from pydantic_core import to_json
 from calib import Calibration
 from daemon.errors import NotCalibratedError, StaleReadingError
 from daemon.pose.active import ActiveCalibration, Poses
-from daemon.rig import Rig, RigSnapshot
+from daemon.pose.answers import fields, past_fields, written_list
+from daemon.rig import PastReadings, Rig, RigSnapshot
+from daemon.rig.utc import rfc3339
 from drivers.errors import DeviceLostError, NotHomedError
 
 logger = logging.getLogger(__name__)
@@ -82,28 +87,40 @@ class PoseService:
         """
         active = self.active
         poses = active.poses(np.asarray(readings, dtype=float), camera, approached)
-        return to_json(
-            {
-                "calibration_id": active.id,
-                "camera": active.camera(camera),
-                "poses": [_pose_fields(poses, index) for index in range(len(poses.readings))],
-            }
-        )
+        return written_list(_common(active, camera), len(poses.readings), partial(fields, poses))
+
+    async def past(self, time: datetime, camera: str | None = None) -> bytes:
+        """Return the pose at a past `time`, as the JSON of the API's `PoseAtTime`.
+
+        Raises NotCalibratedError, UnknownCameraError, TimeNotCoveredError, DeviceLostError, StaleReadingError.
+        """
+        active, past = self.active, await self._rig.past_readings([time])
+        (pose,) = past_fields(_poses_at(active, past, camera), past, [time])
+        return to_json(pose | _common(active, camera))
+
+    async def past_list(self, times: Sequence[datetime], camera: str | None = None) -> bytes:
+        """Return the poses at past `times`, as the JSON of the API's `PosesAtTimes`; raises as `past` does."""
+        active, past = self.active, await self._rig.past_readings(times)
+
+        def write() -> bytes:
+            poses = _poses_at(active, past, camera)
+            return written_list(
+                _common(active, camera), len(times), lambda some: past_fields(poses, past, times, some)
+            )
+
+        return await asyncio.to_thread(write)
 
     def _answer(
         self, active: ActiveCalibration, snapshot: RigSnapshot, camera: str | None
     ) -> Mapping[str, Any]:
         readings = np.array([snapshot.readings], dtype=float)
-        poses = active.poses(readings, camera, np.array([snapshot.approached]))
+        (pose,) = fields(active.poses(readings, camera, np.array([snapshot.approached])))
         assert snapshot.timestamp is not None
         return {
-            "timestamp": self._rig.utc.at(snapshot.timestamp)
-            .isoformat(timespec="microseconds")
-            .replace("+00:00", "Z"),
-            **_pose_fields(poses, 0),
+            "timestamp": rfc3339(self._rig.utc.at(snapshot.timestamp)),
+            **pose,
             "moving": snapshot.moving,
-            "calibration_id": active.id,
-            "camera": active.camera(camera),
+            **_common(active, camera),
         }
 
     def _require_fresh(self, snapshot: RigSnapshot) -> float:
@@ -125,15 +142,10 @@ class PoseService:
         return age
 
 
-def _pose_fields(poses: Poses, index: int) -> dict[str, Any]:
-    world_from_camera = poses.world_from_camera[index]
-    return {
-        "readings": poses.readings[index].tolist(),
-        "approached": poses.approached[index].tolist(),
-        "world_from_camera": world_from_camera.tolist(),
-        "base_from_camera": poses.base_from_camera[index].tolist(),
-        "position": world_from_camera[:3, 3].tolist(),
-        "quaternion": poses.quaternion[index].tolist(),
-        "covariance": None if poses.covariance is None else poses.covariance[index].tolist(),
-        "out_of_range": poses.out_of_range[index],
-    }
+def _poses_at(active: ActiveCalibration, past: PastReadings, camera: str | None) -> Poses:
+    # A reading that may be anywhere within its bounds has the standard deviation of a uniform distribution.
+    return active.poses(past.values, camera, past.approached, past.bounds / np.sqrt(3))
+
+
+def _common(active: ActiveCalibration, camera: str | None) -> dict[str, Any]:
+    return {"calibration_id": active.id, "camera": active.camera(camera)}

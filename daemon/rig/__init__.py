@@ -4,13 +4,23 @@ In the order in which a state travels:
 
     devices           profile -> drivers, clock, simulated world
     device_owner      connecting, losing and finding a device;  controller_owner, camera_owner  the two kinds
-    snapshot          what is known at one instant;  utc  its time stamps in UTC
+    snapshot          what is known at one instant;  utc  its time stamps in UTC;  history  past instants
     stop_latch        nothing moves after a stop before it is acknowledged
     rig               all of it together
 """
 
 from daemon.rig.devices import Devices, make_devices
+from daemon.rig.history import PastReadings
 from daemon.rig.rig import Rig
 from daemon.rig.snapshot import AxisSnapshot, DeviceSnapshot, RigSnapshot, Side
 
-__all__ = ["AxisSnapshot", "DeviceSnapshot", "Devices", "Rig", "RigSnapshot", "Side", "make_devices"]
+__all__ = [
+    "AxisSnapshot",
+    "DeviceSnapshot",
+    "Devices",
+    "PastReadings",
+    "Rig",
+    "RigSnapshot",
+    "Side",
+    "make_devices",
+]

@@ -2,14 +2,16 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import Self
 
 from daemon.broadcast import Broadcast
-from daemon.errors import StandstillError, UnknownAxisError
+from daemon.errors import StaleReadingError, StandstillError, UnknownAxisError
 from daemon.profile import Profile
 from daemon.rig.camera_owner import CameraOwner
 from daemon.rig.controller_owner import Action, ControllerOwner
 from daemon.rig.devices import Devices, make_devices
+from daemon.rig.history import PastReadings, ReadingHistory
 from daemon.rig.snapshot import AxisSnapshot, RigSnapshot
 from daemon.rig.stop_latch import StopLatch
 from daemon.rig.utc import UtcClock
@@ -49,6 +51,9 @@ class Rig:
         self._owner_of = {axis: owner for owner in self._controllers for axis in owner.axes}
         self._camera = CameraOwner(
             profile.camera.spec.name, devices.camera, profile.procedure.frame_timeout, self._publish
+        )
+        self._history = ReadingHistory(
+            self.specs.values(), self.utc, self._pace, profile.procedure.max_reading_age
         )
         self._tasks: list[asyncio.Task[None]] = []
         self.snapshot = self._compose()
@@ -170,6 +175,24 @@ class Rig:
                 owner.poll_soon()
             await self.changed.wait()
 
+    async def past_readings(self, times: Sequence[datetime]) -> PastReadings:
+        """Return what the readings were at `times`; of a time just passed, as soon as the axes are read again.
+
+        Raises TimeNotCoveredError; DeviceLostError and StaleReadingError when they cannot be read again.
+        """
+        stamps = [self.utc.stamp(time) for time in times]
+        latest = max(stamps)
+        if self.snapshot.timestamp is None or self.snapshot.timestamp < latest:
+            allowed = self.profile.procedure.max_reading_age
+            try:
+                async with asyncio.timeout(allowed):
+                    await self.fresh_snapshot(latest)
+            except TimeoutError:
+                raise StaleReadingError(
+                    f"there was no reading for {allowed:g} s: check that the axes answer"
+                ) from None
+        return self._history.at(stamps)
+
     async def frame(self, after: float | None = None) -> Frame:
         """Return the camera's newest frame exposed at or after `after` (rig's clock, s).
 
@@ -187,7 +210,9 @@ class Rig:
         )
 
     def _publish(self) -> None:
+        self.utc.check()
         self.snapshot = self._compose()
+        self._history.note(self.snapshot.axes)
         self.changed.fire()
 
     def _require_known(self, name: str) -> None:

@@ -103,6 +103,23 @@ def test_an_unknown_side_widens_the_pose_by_the_variance_of_two_points() -> None
     assert np.allclose(found, expected, rtol=1e-3, atol=1e-15)
 
 
+def test_unsure_readings_widen_the_pose_as_they_move_it() -> None:
+    rig, std = with_covariance(np.zeros((4, 4))), np.abs(READINGS) * 1e-4 + np.array([0.1, 0.02])
+    found = rig.pose_covariance(READINGS, approached=SIDES, reading_std=std)
+    at = rig.world_from_camera(READINGS, approached=SIDES)
+    expected = 0
+    for joint in (0, 1):
+        off = np.zeros_like(std)
+        off[:, joint] = 1e-3 * std[:, joint]
+        moved = 1e3 * twists(rig.world_from_camera(READINGS + off, approached=SIDES), at)
+        expected = expected + moved[:, :, None] * moved[:, None, :]
+    # The corrections are taken as they are at the reading itself, which is off by parts in a thousand.
+    size = np.sqrt(np.diagonal(found, axis1=1, axis2=2))
+    assert (np.abs(found - expected) <= 0.01 * size[:, :, None] * size[:, None, :] + 1e-9 * size.max()).all()
+    beside = rig.pose_covariance(READINGS, reading_std=std)
+    assert np.allclose(beside, found + rig.pose_covariance(READINGS))
+
+
 def test_the_coefficients_covariance_reaches_the_pose() -> None:
     rng = np.random.default_rng(0)
     root = 1e-3 * rng.normal(size=(4, 4)) * np.array([1, 1, 1, 0.1])[:, None]
