@@ -7,6 +7,7 @@ from typing import Any
 
 from daemon.errors import DaemonError
 from daemon.lease import Lease, LeaseDesk
+from daemon.operation.log_fields import log_fields
 from daemon.rig import Rig
 from drivers.errors import AxisBusyError, DriverError, MotionStoppedError
 
@@ -33,9 +34,10 @@ class ClientMotions:
         for name in self._beginning.intersection(axes):
             motion.close()
             raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
-        task = asyncio.create_task(motion)
+        with log_fields(axis=" ".join(axes)):
+            task = asyncio.create_task(motion)
+            task.add_done_callback(lambda done: self._finished(lease.token, done))
         self._under_way.setdefault(lease.token, set()).add(task)
-        task.add_done_callback(lambda done: self._finished(lease.token, done))
         self._beginning.update(axes)
         try:
             await self._begun(task, axes)

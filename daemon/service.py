@@ -1,5 +1,6 @@
 """The daemon without its HTTP: rig, lease, store, runs and poses, opened together and closed in order."""
 
+import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator
@@ -15,6 +16,9 @@ from daemon.idempotency import AnswersGiven
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
+from daemon.operation.figures import Figures
+from daemon.operation.pulse import watch_loop
+from daemon.operation.rig_figures import RigFigures
 from daemon.pose import ActiveCalibration, Fallback, PoseService
 from daemon.procedure import RunManager
 from daemon.profile import Profile
@@ -32,16 +36,18 @@ class Service:
         self.profile = profile
         self.rig = rig
         self.store = store
+        self.figures = Figures()
         self.leases = LeaseDesk()
         self.motions = ClientMotions(rig, self.leases)
-        self.poses = PoseService(rig)
+        self.poses = PoseService(rig, self.figures.poses.inc)
         self.fallback: Fallback | None = None
         """What the active calibration was found to lack, until another is activated."""
-        self.runs = RunManager(rig, self.leases, store, self._use)
+        self.runs = RunManager(rig, self.leases, store, self._use, self.figures.told)
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
         self.streams = Streams()
         self.answers = AnswersGiven(store.answers)
+        self.figures.registry.register(RigFigures(self))
         self.started_at = datetime.now(UTC)
         self.version = version("activecam")
 
@@ -122,5 +128,7 @@ async def running_service(
         stack.push_async_callback(rig.close)
         service = Service(profile, rig, store)
         stack.push_async_callback(service.halt)
+        pulse = asyncio.create_task(watch_loop(service.figures.loop_lag.observe), name="pulse")
+        stack.callback(pulse.cancel)
         await service.restore()
         yield service

@@ -21,6 +21,7 @@ from daemon.api import (
     runs,
 )
 from daemon.api.guard import Guard
+from daemon.api.observed import Observed
 from daemon.service import Service
 
 PREFIX: Final = "/api/v1"
@@ -72,6 +73,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
     app.include_router(reference.router)
     problems.install(app)
     app.add_middleware(Guard, host_names=host_names)
+    app.add_middleware(Observed, prefix=PREFIX)
     _describe_problems(app)
     return app
 

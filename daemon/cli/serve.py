@@ -1,13 +1,12 @@
 """`activecam serve`: the daemon and its REST API."""
 
-import logging
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.logging import RichHandler
 
-from daemon.cli.console import errors, output
+from daemon.cli.console import output
+from daemon.operation.log_format import LogFormat, LogLevel, log_to_stderr
 from daemon.profile import load_profile
 from daemon.server import DEFAULT_HOST, DEFAULT_PORT
 from daemon.server import serve as serve_rig
@@ -33,20 +32,17 @@ def serve(
         Path | None, typer.Option(help="Serve by HTTPS with this certificate (PEM).")
     ] = None,
     tls_key: Annotated[Path | None, typer.Option(help="The certificate's private key (PEM).")] = None,
+    log_format: Annotated[LogFormat, typer.Option(help="How the log on stderr is written.")] = LogFormat.TEXT,
+    log_level: Annotated[LogLevel, typer.Option(help="From which level on.")] = LogLevel.INFO,
 ) -> None:
     """Own the rig: move its axes, run calibrations, and answer where the camera is, by HTTP."""
     if (tls_certificate is None) != (tls_key is None):
         raise typer.BadParameter("--tls-certificate and --tls-key go together: give both, or neither")
     tls = None if tls_certificate is None or tls_key is None else Tls(tls_certificate, tls_key)
     rig = load_profile(profile)
-    _log_to_stderr()
+    log_to_stderr(log_format, log_level)
 
     def ready(address: str) -> None:
         output.print(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)", soft_wrap=True)
 
     serve_rig(rig, data, host, port, ready, host_names=host_name or (), tls=tls)
-
-
-def _log_to_stderr() -> None:
-    handler = RichHandler(console=errors, show_path=False, markup=False)
-    logging.basicConfig(level=logging.INFO, format="%(message)s", datefmt="[%X]", handlers=[handler])

@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any
@@ -25,10 +25,14 @@ Array = NDArray[np.float64]
 
 
 class PoseService:
-    """Answers without touching hardware. Transforms are 4 x 4 in metres, quaternions x, y, z, w."""
+    """Answers without touching hardware. Transforms are 4 x 4 in metres, quaternions x, y, z, w.
 
-    def __init__(self, rig: Rig) -> None:
+    `given` is called, from any thread, with the number of poses of each answer.
+    """
+
+    def __init__(self, rig: Rig, given: Callable[[int], None] = lambda _: None) -> None:
         self._rig = rig
+        self._given = given
         self._active: ActiveCalibration | None = None
         self._written: dict[str | None, tuple[RigSnapshot, bytes]] = {}
         """For each camera, the answer to the latest snapshot but for its age, which goes on changing."""
@@ -69,6 +73,7 @@ class PoseService:
         if written is None or written[0] is not snapshot:
             written = snapshot, to_json(self._answer(active, snapshot, camera))[:-1]
             self._written[camera] = written
+        self._given(1)
         return b'%s,"age_s":%.6f}' % (written[1], age)
 
     def readings_now(self) -> tuple[Array, Array]:
@@ -87,6 +92,7 @@ class PoseService:
         """
         active = self.active
         poses = active.poses(np.asarray(readings, dtype=float), camera, approached)
+        self._given(len(poses.readings))
         return written_list(_common(active, camera), len(poses.readings), partial(fields, poses))
 
     async def past(self, time: datetime, camera: str | None = None) -> bytes:
@@ -96,6 +102,7 @@ class PoseService:
         """
         active, past = self.active, await self._rig.past_readings([time])
         (pose,) = past_fields(_poses_at(active, past, camera), past, [time])
+        self._given(1)
         return to_json(pose | _common(active, camera))
 
     async def past_list(self, times: Sequence[datetime], camera: str | None = None) -> bytes:
@@ -104,6 +111,7 @@ class PoseService:
 
         def write() -> bytes:
             poses = _poses_at(active, past, camera)
+            self._given(len(times))
             return written_list(
                 _common(active, camera), len(times), lambda some: past_fields(poses, past, times, some)
             )

@@ -1,7 +1,7 @@
 """A run's events in order: kept, written beside its session, and followed by any number of readers."""
 
 import logging
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -13,6 +13,8 @@ from daemon.procedure.events import EVENT, Finished, RunEvent
 from daemon.store import RunRecord
 
 logger = logging.getLogger(__name__)
+
+Told = Callable[[RunEvent], None]
 
 FILE_NAME = "events.jsonl"
 
@@ -26,6 +28,7 @@ class EventLog:
         self._file = folder / FILE_NAME
         self._changed = Broadcast()
         self._ended = False
+        self._listener: Told | None = None
 
     @classmethod
     def reopen(cls, run: RunRecord, folder: Path) -> Self:
@@ -36,6 +39,10 @@ class EventLog:
         make_folder_durably(folder)
         write_durably(folder / FILE_NAME, lines.encode())
         return cls(run.id, folder, earlier)
+
+    def listen(self, listener: Told) -> None:
+        """Call `listener` with each event from now on."""
+        self._listener = listener
 
     def add(self, event: RunEvent) -> None:
         """Tell an event under the next number; what a solver says of a run that is over is dropped."""
@@ -50,6 +57,8 @@ class EventLog:
         except OSError as error:
             # The session and the store are what counts; a run does not end for want of its diary.
             logger.warning("%s: an event could not be written: %s", self._file, error.strerror)
+        if self._listener is not None:
+            self._listener(numbered)
         self._changed.fire()
 
     async def follow(self, after: int = 0) -> AsyncIterator[RunEvent]:

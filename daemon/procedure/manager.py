@@ -11,7 +11,7 @@ from calib import Calibration
 from daemon.errors import ProfileChangedError, RigFaultError, RunActiveError, RunStateError, StoreError
 from daemon.lease import Lease, LeaseDesk
 from daemon.procedure.assignment import Assignment, Calibrate, Solve
-from daemon.procedure.event_log import EventLog, past_events
+from daemon.procedure.event_log import EventLog, Told, past_events
 from daemon.procedure.events import RunEvent
 from daemon.procedure.run import Run
 from daemon.profile_document import ProfileDocument
@@ -24,14 +24,18 @@ Activate = Callable[[CalibrationRecord, Calibration], None]
 class RunManager:
     """Starts and steers runs, and knows those of the past.
 
-    `activate` is called with the calibration of a run that has succeeded, before its last event is told.
+    `activate` is called with the calibration of a run that has succeeded, before its last event is told; `told`
+    with every event.
     """
 
-    def __init__(self, rig: Rig, leases: LeaseDesk, store: Store, activate: Activate) -> None:
+    def __init__(
+        self, rig: Rig, leases: LeaseDesk, store: Store, activate: Activate, told: Told | None = None
+    ) -> None:
         self._rig = rig
         self._leases = leases
         self._store = store
         self._activate = activate
+        self._told = told
         self._latest: Run | None = None
         self._starting = asyncio.Lock()
         self._closed = False
@@ -154,6 +158,8 @@ class RunManager:
             if lease is not None:
                 self._leases.release(lease.token)
             raise
+        if self._told is not None:
+            log.listen(self._told)
         running = replace(record, state=RunState.RUNNING, ended_at=None, error=None)
         self._latest = Run(running, assignment, log, self._store, self._end_of(lease))
         self._latest.start()

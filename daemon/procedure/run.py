@@ -11,6 +11,7 @@ from calib import Calibration
 from calib.documents import write_json
 from calib.errors import CalibError
 from daemon.errors import DaemonError, RunStateError, StandstillError
+from daemon.operation.log_fields import log_fields
 from daemon.procedure.assignment import Assignment
 from daemon.procedure.conclusion import Conclusion
 from daemon.procedure.event_log import EventLog
@@ -48,7 +49,8 @@ class Run:
 
     def start(self) -> asyncio.Task[None]:
         """Begin; the task ends with the run and never fails."""
-        self._task = asyncio.create_task(self._execute(), name=f"run {self.record.id}")
+        with log_fields(run=self.record.id):
+            self._task = asyncio.create_task(self._execute(), name=f"run {self.record.id}")
         return self._task
 
     def pause(self) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from daemon.operation.log_fields import log_fields
 from daemon.rig.device_owner import DeviceOwner
 from daemon.rig.snapshot import AxisSnapshot, Side
 from daemon.rig.stop_latch import StopLatch
@@ -124,7 +125,8 @@ class ControllerOwner(DeviceOwner):
         self.require_idle(name)
         self._latch.require_free()
         record = self._axes[name]
-        motion = asyncio.ensure_future(self._act(name, action))
+        with log_fields(axis=name):
+            motion = asyncio.ensure_future(self._act(name, action))
         record.motion, record.last_error = motion, None
         self._publish()
         try:

@@ -7,6 +7,7 @@ from typing import Self
 
 from daemon.broadcast import Broadcast
 from daemon.errors import StaleReadingError, StandstillError, UnknownAxisError
+from daemon.operation.log_fields import log_fields
 from daemon.profile import Profile
 from daemon.rig.camera_owner import CameraOwner
 from daemon.rig.controller_owner import Action, ControllerOwner
@@ -67,7 +68,9 @@ class Rig:
         """
         rig = cls(profile, make_devices(profile) if devices is None else devices)
         owners = [*rig._controllers, rig._camera]
-        rig._tasks = [asyncio.create_task(owner.run(), name=f"owner of {owner.name}") for owner in owners]
+        for owner in owners:
+            with log_fields(device=owner.name):
+                rig._tasks.append(asyncio.create_task(owner.run(), name=f"owner of {owner.name}"))
         try:
             for owner in owners:
                 await owner.attempted.wait()

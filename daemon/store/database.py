@@ -29,6 +29,8 @@ class Database:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.path = folder / "activecam.db"
+        self.errors = 0
+        """How often it could not be used."""
         self._lock: IO[str] | None = None
         self._engine: Engine | None = None
         # One thread: SQLite writes one transaction at a time, and a commit waits for the disk.
@@ -68,6 +70,7 @@ class Database:
         try:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
         except SQLAlchemyError as error:
+            self.errors += 1
             raise StoreError(f"{self.path}: the database cannot be used: {_reason_of(error)}") from error
         except ValueError as error:
             raise StoreError(f"{self.path}: a record in the database is damaged: {error}") from error

@@ -31,6 +31,11 @@ class Store:
         """Let the database go."""
         await self._database.close()
 
+    @property
+    def errors(self) -> int:
+        """How often the database could not be used."""
+        return self._database.errors
+
     def session_folder(self, run: RunRecord) -> Path:
         """Return where the session of `run` is."""
         return self._database.folder / run.session

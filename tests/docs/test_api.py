@@ -16,8 +16,8 @@ from pydantic import BaseModel
 
 from daemon.api import create_app, pose_stream, problems
 from daemon.procedure import RunEvent
-from daemon.service import Service
-from tests.daemon.rigs import write_profile
+from daemon.service import Service, running_service
+from tests.daemon.rigs import small_rig, write_profile
 from tests.docs.pages import blocks, page, table_below, unquoted
 
 PAGE = "reference/api.md"
@@ -151,3 +151,13 @@ def test_the_examples_work_one_after_the_other(served: str, tmp_path: Path) -> N
     streamed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert streamed.returncode == 0, streamed.stderr
     assert len(streamed.stdout.splitlines()) == 3
+
+
+async def test_every_figure_is_on_the_page(tmp_path: Path) -> None:
+    async with running_service(small_rig(tmp_path), tmp_path / "data") as service:
+        families = {family.name: family.type for family in service.figures.registry.collect()}
+    described = {
+        name for row in table_below(page(PAGE), "### Figures") for name in re.findall(r"`(\w+)`", row[0])
+    }
+    ours = {name for name in families if name.startswith("activecam_")}
+    assert described == {f"{name}_total" if families[name] == "counter" else name for name in ours}
