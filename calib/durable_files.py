@@ -20,10 +20,10 @@ def write_durably(path: Path, data: bytes) -> None:
 
 
 def put_in_place(written: Path, path: Path) -> None:
-    """Flush the file `written`, which is in the same folder, and let it take the place of `path`."""
-    _flush(written)
+    """Flush the file `written`, which is on the same file system, and let it take the place of `path`."""
+    flush(written)
     written.replace(path)
-    _flush(path.parent)
+    flush(path.parent)
 
 
 def make_folder_durably(folder: Path) -> None:
@@ -31,10 +31,11 @@ def make_folder_durably(folder: Path) -> None:
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     for path in reversed(missing):
         path.mkdir(exist_ok=True)
-        _flush(path.parent)
+        flush(path.parent)
 
 
-def _flush(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Return when the file or folder `path` is on disk as it is."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -29,6 +29,7 @@
     │   ├── IdempotencyConflictError           this key was another request's
     │   ├── IdempotencyInProgressError         the first request of this key is still under way
     │   └── IdempotencyUnknownError            how the first request of this key ended is not known
+    ├── BackupError                            a backup that cannot be made, or not be restored
     ├── PrintError                             a target that cannot be drawn as large, or as finely, as asked
     └── ServeError                             the address cannot be served
 
@@ -154,6 +155,10 @@ class IdempotencyInProgressError(IdempotencyError):
 
 class IdempotencyUnknownError(IdempotencyError):
     """The request of this key was begun, and the daemon ended before it was answered."""
+
+
+class BackupError(DaemonError):
+    """A backup cannot be written, is damaged, or cannot be restored where it was asked to."""
 
 
 class PrintError(DaemonError):

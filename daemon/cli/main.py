@@ -8,7 +8,20 @@ from typing import Annotated
 import typer
 
 from calib.errors import CalibError, ReadingsError
-from daemon.cli import demo, detect, doctor, pose, profile, serve, simulate, solve, target, truth, verify
+from daemon.cli import (
+    backup,
+    demo,
+    detect,
+    doctor,
+    pose,
+    profile,
+    serve,
+    simulate,
+    solve,
+    target,
+    truth,
+    verify,
+)
 from daemon.cli.console import errors
 from daemon.errors import DaemonError
 from daemon.profile import ProfileError
@@ -43,7 +56,7 @@ def activecam(
     """Calibrate a camera on motorised axes with the camera itself, and serve its pose."""
 
 
-for command in (demo, serve, simulate, doctor, detect, solve, pose, verify, truth, target):
+for command in (demo, serve, simulate, doctor, detect, solve, pose, verify, truth, target, backup):
     command.register(app)
 app.add_typer(profile.app, name="profile")
 

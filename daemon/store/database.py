@@ -1,24 +1,26 @@
 """The SQLite file: durable, of a known schema version, and used by one thread of its own."""
 
 import asyncio
-import fcntl
 import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import IO, Any, Self, TypeVar
+from typing import IO, Any, Final, Self, TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
-from calib.durable_files import make_folder_durably
 from daemon.errors import StoreError
 from daemon.store.copies import copy_database
+from daemon.store.folder_lock import lock_folder
 from daemon.store.migrations import migrate, schema_version
 from daemon.store.tables import Table
 
 logger = logging.getLogger(__name__)
+
+DATABASE: Final = "activecam.db"
+"""Its name in the data folder."""
 
 Result = TypeVar("Result")
 
@@ -28,7 +30,7 @@ class Database:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.path = folder / "activecam.db"
+        self.path = folder / DATABASE
         self.errors = 0
         """How often it could not be used."""
         self._lock: IO[str] | None = None
@@ -76,17 +78,7 @@ class Database:
             raise StoreError(f"{self.path}: a record in the database is damaged: {error}") from error
 
     def _open(self) -> None:
-        try:
-            make_folder_durably(self.folder)
-            self._lock = (self.folder / "activecam.lock").open("w")
-        except OSError as error:
-            raise StoreError(f"{self.folder}: the data folder cannot be used: {error.strerror}") from error
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise StoreError(
-                f"{self.folder}: another activecam uses this data folder: stop it, or choose another --data"
-            ) from None
+        self._lock = lock_folder(self.folder)
         self._engine = create_engine(f"sqlite:///{self.path}")
         event.listen(self._engine, "connect", _make_durable)
         event.listen(self._engine, "begin", _begin)
