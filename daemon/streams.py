@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Generator
+from collections.abc import AsyncGenerator, AsyncIterator, Generator
 from typing import Any, Final, TypeVar
 
 Item = TypeVar("Item")
@@ -23,7 +23,7 @@ class Streams:
         """End all streams, and let no new one last."""
         self._closing.set()
 
-    async def follow(self, items: AsyncIterator[Item]) -> AsyncIterator[Item | None]:
+    async def follow(self, items: AsyncIterator[Item]) -> AsyncGenerator[Item | None]:
         """Yield `items`, and None after each HEARTBEAT of silence, until they end or the streams do."""
         with self._counted():
             closing = asyncio.ensure_future(self._closing.wait())

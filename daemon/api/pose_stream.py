@@ -1,14 +1,16 @@
 """The pose as a WebSocket stream: a message for each new reading, or the problem that is in its way."""
 
-from collections.abc import AsyncIterator
+import asyncio
+import contextlib
+from collections.abc import AsyncGenerator, AsyncIterator
+from typing import Annotated
 
-from fastapi import APIRouter, WebSocket, WebSocketDisconnect, status
+from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect, status
 from pydantic_core import to_json
 
 from calib.errors import CalibError
 from daemon.api import problems
 from daemon.errors import DaemonError
-from daemon.rig import Rig
 from daemon.service import Service
 from drivers.errors import DriverError
 
@@ -16,33 +18,70 @@ router = APIRouter(tags=["pose"])
 
 
 @router.websocket("/pose/stream")
-async def stream_pose(socket: WebSocket, camera: str | None = None) -> None:
-    """Send what `GET /pose` answers at each new reading; a problem document is sent once, when it arises."""
+async def stream_pose(
+    socket: WebSocket, camera: str | None = None, rate: Annotated[float | None, Query(gt=0)] = None
+) -> None:
+    """Send what `GET /pose` answers at each new reading; a problem document is sent once, when it arises.
+
+    `rate` is how many poses a second are sent at most. `dropped` of a pose says how many readings were left out before
+    it, since the client asked for fewer or read too slowly.
+    """
     service: Service = socket.app.state.service
     await socket.accept()
-    sent_problem: str | None = None
+    poses = messages(service, camera, socket.url.path, 0.0 if rate is None else 1 / rate)
+    sending = asyncio.ensure_future(_send(socket, service.streams.follow(poses)))
+    leaving = asyncio.ensure_future(_left(socket))
     try:
-        async for _ in service.streams.follow(_readings(service.rig)):
-            try:
-                message = service.poses.now(camera)
-                sent_problem = None
-            except (DaemonError, DriverError, CalibError) as error:
-                kind = problems.kind_of(error)
-                if kind.code == sent_problem:
-                    continue
-                sent_problem = kind.code
-                message = to_json(problems.document(kind, str(error), socket.url.path))
-            await socket.send_text(message.decode())
-        await socket.close(status.WS_1001_GOING_AWAY, "the daemon is shutting down")
-    except WebSocketDisconnect:
-        pass  # the client has seen enough
+        done, _ = await asyncio.wait({sending, leaving}, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in (sending, leaving):
+            task.cancel()
+        await asyncio.gather(sending, leaving, return_exceptions=True)
+    if sending in done:
+        sending.result()
 
 
-async def _readings(rig: Rig) -> AsyncIterator[None]:
-    """Yield now, and whenever there is a new reading."""
-    seen = None
+async def messages(service: Service, camera: str | None, address: str, period: float) -> AsyncIterator[bytes]:
+    """Yield the pose now and at each new reading, `period` (s) apart at least, and each problem when it arises.
+
+    Whoever asks for the next one late gets the newest.
+    """
+    loop, rig = asyncio.get_running_loop(), service.rig
+    due, told = loop.time(), None
+    sent: list[int] | None = None  # how many times each axis had been read at the pose before
     while True:
-        if rig.snapshot.timestamp != seen or seen is None:
-            seen = rig.snapshot.timestamp
-            yield None
-        await rig.changed.wait()
+        read = [axis.number for axis in rig.snapshot.axes]
+        try:
+            pose = service.poses.now(camera)
+        except (DaemonError, DriverError, CalibError) as error:
+            sent, kind = None, problems.kind_of(error)
+            if kind != told:
+                told = kind
+                yield to_json(problems.document(kind, str(error), address))
+        else:
+            if read != sent:
+                since = 1 if sent is None else max(now - then for now, then in zip(read, sent, strict=True))
+                yield b'%s,"dropped":%d}' % (pose[:-1], since - 1)
+                sent, told = read, None
+                due = max(due + period, loop.time())
+                await asyncio.sleep(due - loop.time())
+                continue
+        # Nothing new comes from axes that have fallen silent, which is to be told as well.
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(rig.profile.procedure.max_reading_age):
+                await rig.changed.wait()
+
+
+async def _send(socket: WebSocket, poses: AsyncGenerator[bytes | None]) -> None:
+    with contextlib.suppress(WebSocketDisconnect):
+        async with contextlib.aclosing(poses):
+            async for message in poses:
+                if message is not None:
+                    await socket.send_text(message.decode())
+        await socket.close(status.WS_1001_GOING_AWAY, "the daemon is shutting down")
+
+
+async def _left(socket: WebSocket) -> None:
+    """Return when the client has gone, which nothing else tells while there is nothing to send."""
+    while (await socket.receive())["type"] != "websocket.disconnect":
+        pass

@@ -26,6 +26,7 @@ class _AxisRecord:
 
     spec: AxisSpec
     state: AxisState | None = None
+    number: int = 0
     motion: asyncio.Task[None] | None = None
     approached: Side = 0
     must_home: bool = False
@@ -67,6 +68,7 @@ class ControllerOwner(DeviceOwner):
             self.name,
             position=state.position,
             timestamp=state.timestamp,
+            number=record.number,
             moving=state.moving or in_motion,
             homed=state.homed and not record.must_home,
             approached=record.approached,
@@ -175,7 +177,7 @@ class ControllerOwner(DeviceOwner):
         state = await self._controller.axes[name].read()
         record = self._axes[name]
         if record.state is None or state.timestamp >= record.state.timestamp:
-            record.state = state
+            record.state, record.number = state, record.number + 1
 
     async def _close(self) -> None:
         motions = [record.motion for record in self._axes.values() if record.motion is not None]

@@ -19,6 +19,8 @@ class AxisSnapshot:
     """None while the axis does not know where it is."""
     timestamp: float | None = None
     """Time of the reading on the rig's clock (s); None before the first."""
+    number: int = 0
+    """How many times the axis has been read."""
     moving: bool = False
     homed: bool = False
     approached: Side = 0
