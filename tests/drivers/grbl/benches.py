@@ -24,6 +24,10 @@ AXES: Mapping[str, GrblAxisOptions] = {
     "slide": GrblAxisOptions(letter="X", machine_zero="60.5 mm", steps=250.0),
     "pan": GrblAxisOptions(letter="Y", machine_zero="40.5 deg", steps=80.0),
 }
+QUICK: Mapping[int, float] = {24: 60000, 25: 60000, 120: 20000, 121: 20000, 122: 20000}
+"""Settings of a table that has found its switches before anybody waits for it."""
+SLOW_HOMING: Mapping[int, float] = {24: 600, 25: 6000}
+"""Settings of one whose homing can be disturbed."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,11 @@ class Table:
         """Where the axis truly is, in its reading unit."""
         return self.world.shaft(axis)[1].motor(self.world.clock.now())
 
+    def put(self, axis: str, reading: float) -> None:
+        """Step an axis to a place in no time, and have its steps counted."""
+        zero = AXES[axis].zero(SPECS[axis])
+        self.emulator.motors[axis].go(reading - zero, 1e12, 1e15)
+
 
 def make(
     changes: Mapping[int, float] | None = None,
@@ -54,7 +63,7 @@ def make(
     axes: Mapping[str, GrblAxisOptions] = AXES,
     **options: Any,
 ) -> Table:
-    """Make a table that is not plugged in yet; `changes` are settings of the emulator."""
+    """Make a table that is not plugged in yet; `changes` are settings of the emulator, which are `QUICK` otherwise."""
     clock = SystemClock()
     simulation = SimulationOptions.model_validate(
         {"camera": rigs.camera_truth(), "joints": rigs.joint_truths()}
@@ -62,7 +71,12 @@ def make(
     world = SimulatedWorld(simulation, [SLIDE, PAN], rigs.TARGETS["circle_grid"], clock)
     context = DriverContext(clock, world)
     emulator = GrblEmulator(
-        SPECS, AXES, context, changes=changes, restarts=restarts, single_axis_homing=single_axis_homing
+        SPECS,
+        AXES,
+        context,
+        changes={**QUICK, **(changes or {})},
+        restarts=restarts,
+        single_axis_homing=single_axis_homing,
     )
     keys = {"answer_timeout": "500 ms", "report_interval": "10 ms"} | options
     controller = GrblController.create(
@@ -103,8 +117,8 @@ async def homed(*arguments: Any, **options: Any) -> AsyncIterator[Table]:
     """Give a table whose axes are homed, and stand at 1/10 of their travel."""
     async with opened(*arguments, **options) as table:
         await table.slide.home()
-        await table.slide.move(6.0)
-        await table.pan.move(-32.0)
+        table.put("slide", 6.0)
+        table.put("pan", -32.0)
         yield table
 
 

@@ -19,7 +19,18 @@ from drivers.errors import (
 from drivers.grbl import GrblController
 from drivers.grbl.options import GrblAxisOptions, GrblOptions
 from drivers.registry import controller_driver
-from tests.drivers.grbl.benches import AXES, SLIDE, SPECS, Table, homed, moving, opened, plugged, until
+from tests.drivers.grbl.benches import (
+    AXES,
+    SLIDE,
+    SLOW_HOMING,
+    SPECS,
+    Table,
+    homed,
+    moving,
+    opened,
+    plugged,
+    until,
+)
 
 
 async def fault(table: Table) -> str | None:
@@ -164,6 +175,7 @@ async def test_a_motor_that_does_not_turn_is_found_by_homing() -> None:
 
 async def test_homing_that_is_stopped_leaves_the_axes_unhomed_and_without_alarm() -> None:
     async with homed() as table:
+        table.emulator.settings.update(SLOW_HOMING)
         homing = asyncio.create_task(table.slide.home())
         await moving(table)
         await table.slide.stop()
@@ -179,6 +191,7 @@ async def test_homing_that_is_stopped_leaves_the_axes_unhomed_and_without_alarm(
 
 async def test_homing_says_that_it_moves_and_knows_no_position() -> None:
     async with homed() as table:
+        table.emulator.settings.update(SLOW_HOMING)
         homing = asyncio.create_task(table.slide.home())
         await moving(table)
         for axis in (table.slide, table.pan):  # without single-axis homing all of them are homed

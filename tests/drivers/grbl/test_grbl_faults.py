@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Mapping
 import pytest
 
 from drivers.errors import DeviceFaultError, DeviceLostError, DriverError, MotionError
-from tests.drivers.grbl.benches import Table, homed, moving, plugged, until
+from tests.drivers.grbl.benches import QUICK, SLOW_HOMING, Table, homed, moving, plugged, until
 
 BOUND = 30.0
 """Seconds in which everything has ended, on a machine that is busy with other things, too."""
@@ -24,8 +24,14 @@ FAULTS: Mapping[str, Fault] = {
 SILENT = {"mute", "late", "garbage", "unplugged"}
 """Those that make it a device that is lost; with the others it answers, and says what is wrong."""
 
+
+def home_slowly(table: Table) -> Awaitable[None]:
+    table.emulator.settings.update(SLOW_HOMING)
+    return table.slide.home()
+
+
 PHASES: Mapping[str, Callable[[Table], Awaitable[None]]] = {
-    "homing": lambda table: table.slide.home(),
+    "homing": home_slowly,
     "moving": lambda table: table.slide.move(55.0),
     "jogging": lambda table: table.slide.jog(45.0),
 }
@@ -48,14 +54,15 @@ async def recovered(table: Table) -> None:
     """Repair the line, connect again, home, and move."""
     async with asyncio.timeout(BOUND):
         table.emulator.repair()
+        table.emulator.settings.update(QUICK)
         table.emulator.replug()
         await table.controller.close()
         await table.controller.open()
         state = await table.slide.read()
         assert (state.homed, state.position, state.moving) == (False, None, False)
         await table.slide.home()
-        await table.slide.move(30.0)
-        assert table.shaft() == pytest.approx(30.0, abs=1e-3)
+        await table.slide.move(50.0)
+        assert table.shaft() == pytest.approx(50.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("phase", PHASES)
