@@ -122,14 +122,20 @@ class Network(canopen.Network):  # type: ignore[misc]
 
     def open(self, arguments: dict[str, Any]) -> None:
         """Take the bus that `can.Bus` makes of `arguments`."""
-        self.connect(**arguments)
+        self.bus: Any = can.Bus(**arguments)
+        received = getattr(self.bus, "socket", None)
+        if received is not None:
+            # An interface that goes wakes who receives and who sends, and the first to look takes the error:
+            # the other one, told that there is something, would wait for it for ever.
+            received.setblocking(False)
+        self.connect()
 
     def close(self) -> None:
         """Let the bus go, whatever state it is in."""
         self._closing.set()
         if self._beating is not None:
             self._beating.join()
-        bus: Any = self.bus  # type: ignore[has-type]
+        bus = self.bus
         try:
             self.disconnect()
         except (can.CanError, OSError) as error:
@@ -179,7 +185,8 @@ class _Watch(can.Listener):
             self._network.lose("its controller went off the bus after too many errors")
 
     def on_error(self, exc: Exception) -> None:
-        self._network.lose(str(exc))
+        if getattr(exc, "error_code", None) != errno.EAGAIN:  # which says that somebody else was told
+            self._network.lose(str(exc))
         time.sleep(_PATIENCE)  # the thread that receives tries again and again until it is closed
 
     def stop(self) -> None:

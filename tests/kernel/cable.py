@@ -47,6 +47,7 @@ class Cable:
             try:
                 socket.if_nametoindex(self._interface)  # python-can leaks a socket where there is none
                 with can.Bus(interface="socketcan", channel=self._interface, can_filters=_FOR_DRIVES) as bus:
+                    bus.socket.setblocking(False)  # an error that wakes it may be taken by who sends
                     self._computer = bus
                     while not self._ending.is_set():
                         message = bus.recv(_LOOK)

@@ -94,6 +94,19 @@ async def test_an_interface_that_goes_in_mid_move_comes_back(
     assert rig.reading("slide") == pytest.approx(-2.0)
 
 
+async def test_an_interface_that_goes_while_much_is_sent_leaves_nobody_waiting(interface: None) -> None:
+    before = threading.enumerate()
+    for _ in range(10):
+        link = Link(Cia402Options(channel=INTERFACE), [1])
+        await link.open()
+        await link.ask(lambda network: network.beat(127, 0.0005))
+        await asyncio.sleep(0.05)
+        take_down()
+        await link.close()
+        bring_up()
+    assert threading.enumerate() == before
+
+
 async def test_a_bus_that_others_flood_costs_time_and_nothing_else(rig: Rig) -> None:
     await rig.controller.open()
     await rig.slide.home()
