@@ -97,7 +97,7 @@ def measure_corners(
     blurs = np.exp(np.where(found, rough.parameters[:, 2], np.median(rough.parameters[found, 2])))
     sharp = bool(np.median(blurs) < SHARPEST)
     if sharp:
-        softened = cv2.GaussianBlur(picture.values, (0, 0), SOFTENING)
+        softened = cv2.GaussianBlur(picture.values.astype(np.float32), (0, 0), SOFTENING)
         picture = replace(picture, values=np.asarray(softened, dtype=np.float32))
         blurs = np.hypot(blurs, SOFTENING)
 

@@ -90,14 +90,14 @@ class _Blocks:
         middle = (self.size - 1) / 2
         x = self.samples.x.ravel()[places][:, None] + (column - middle).astype(np.float32)
         y = self.samples.y.ravel()[places][:, None] + (row - middle).astype(np.float32)
-        return Samples(x, y, values, np.ones_like(values))
+        return Samples(x, y, values.astype(np.float32), np.ones_like(x))
 
 
 def _blocks(picture: Picture, disks: Disks, size: int) -> _Blocks:
     """Cut windows out of the picture that hold all that is clear round each disk."""
     height, width = (side // size for side in picture.values.shape)
-    whole = picture.values[: height * size, : width * size]
-    averaged = whole if size == 1 else cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    whole = picture.values[: height * size, : width * size].astype(np.float32)
+    averaged = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
     reach = disks.clear[:, None] * np.linalg.norm(disks.shapes, axis=2)
     first = np.floor((disks.centres - reach) / size).astype(np.int64)
     columns, rows = np.ceil(2 * reach.max(axis=0) / size).astype(int) + 1

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from calib.errors import DetectionError
 
 SMALLEST_SIDE = 32
-SAMPLES = 50_000  # of the pixels; enough for the light and the noise
+SAMPLES = 10_000  # of the pixels; enough for the light, and to 1 % for the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Picture:
     """
 
     grey: NDArray[np.uint8]
-    values: NDArray[np.float32]
+    values: NDArray[np.uint8 | np.uint16 | np.float32]
     noise: float
 
     @property
@@ -55,7 +55,7 @@ def read_picture(image: NDArray[np.generic]) -> Picture:
     """
     values = grey_values(image)
     apart = max(round(sqrt(values.size / SAMPLES)), 1)
-    return Picture(_stretched(values, apart), values.astype(np.float32), noise_of(values, apart))
+    return Picture(_stretched(values, apart), values, noise_of(values, apart))
 
 
 def grey_values(
@@ -127,9 +127,10 @@ def _stretched(values: NDArray[np.uint8 | np.uint16], apart: int) -> NDArray[np.
         raise DetectionError(
             f"every pixel has the grey value {dark:g}: is the lens covered or the light off?"
         )
-    levels = np.arange(np.iinfo(values.dtype).max + 1)
-    table = np.clip(np.rint((levels - dark) * (255.0 / (bright - dark))), 0, 255).astype(np.uint8)
-    return np.asarray(cv2.LUT(values, table) if values.dtype == np.uint8 else np.take(table, values))
+    times = 255.0 / (bright - dark)
+    # Less than 0 becomes 0, and more than 255 becomes 255.
+    stretched = cv2.addWeighted(values, times, values, 0, -times * dark, dtype=cv2.CV_8U)
+    return np.asarray(stretched, dtype=np.uint8)
 
 
 def noise_of(values: NDArray[np.uint8 | np.uint16], apart: int = 3) -> float:

@@ -61,4 +61,6 @@ def strips(picture: Picture, origins: Floats, starts: Floats, ends: Floats, widt
     x, y = (
         np.where(steep[:, None, None], *pair) for pair in ((off_across, off_along), (off_along, off_across))
     )
-    return Patches(*(each.reshape(len(starts), -1) for each in (x, y, values, used.astype(np.float32))))
+    return Patches(
+        *(each.astype(np.float32, copy=False).reshape(len(starts), -1) for each in (x, y, values, used))
+    )

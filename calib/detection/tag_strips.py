@@ -114,7 +114,7 @@ def strips_along(picture: Picture, sides: Sides, blur: float, unknown: Floats, l
     index = (right * strides[..., :1] + down * strides[..., 1:]).astype(np.intp)[..., None, :]
     index = index + strides[..., 1:, None] * across
     # What is out of the picture is not used, whatever is taken for it.
-    values = picture.values.take(index, mode="clip").reshape(heights.shape)
+    values = picture.values.take(index, mode="clip").astype(np.float32).reshape(heights.shape)
     cells = _cells_seen(sides, heights, along, used, blur)
     return Strips(heights, along, x, y, values, used.astype(np.float32), cells)
 

@@ -198,7 +198,7 @@ def _corners(
 
 
 def _tags(window: Window, target: AprilGrid, near: Array, chosen: NDArray[np.int64]) -> _Measured:
-    picture = Picture(np.empty((0, 0), np.uint8), window.values.astype(np.float32), window.noise)
+    picture = Picture(np.empty((0, 0), np.uint8), window.values, window.noise)
     found = measure_tags(picture, target, chosen, near)
     good = np.repeat(found.found[:, None], near.shape[1], axis=1)
     return _Measured(found.pixels, found.covariances, good)
