@@ -14,6 +14,7 @@ from calib.detection.smooth import Smooth, smooth
 FEWEST = 4  # points that tell a plane's view
 NARROWEST = 1e-6  # m; points that are off a line by no more are on it
 LENS_STEPS = 5
+STANDS_STILL = 0.1  # px, of a step; it leaves less than a tenth of itself, which the rest takes up
 UNTOLD = 1e-3  # of what points tell best; what they tell less of the lens is left as it is
 REST_DEGREE = 3
 
@@ -97,6 +98,8 @@ def bent_view(
         change = np.linalg.lstsq(slopes, off.ravel(), rcond=UNTOLD)[0]
         H = (np.eye(3) + np.append(change[:8], 0).reshape(3, 3)) @ H
         distortion = distortion + change[8:]
+        if span * np.abs(slopes @ change).max() < STANDS_STILL:
+            break
     at = PlaneView(H).project(points)
     without_lens = PlaneView(to_pixels @ H)
     off = span * (seen - at - _bends(at) @ distortion)
