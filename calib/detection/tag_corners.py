@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.picture import Picture
-from calib.detection.plane import bent_view, view_of_plane
+from calib.detection.plane import BentView, bent_view, view_of_plane
 from calib.detection.tag_fit import TagFit, first_look, fit_tags
 from calib.detection.tag_sides import AFTER, BEFORE, Floats, Sides, sides_of
 from calib.detection.tag_strips import strips_along
@@ -22,7 +22,7 @@ FIRST_BLUR = 1.0  # px; tried before it is known
 MUCH_BLURRED = 1.25  # times what was thought: what was kept clear of other edges was not
 MOST_TRIALS = 3
 ROUGH, ROUGH_BOW = 1.5, 0.01  # px, and of a side: how far edges may be off the lines between rough corners
-FEW_LINES, MANY_LINES = 12, 64
+FEW_LINES, TRACKED_LINES, MANY_LINES = 12, 24, 64
 MOST_MOVED, MAY_MOVE = 0.1, 3.0  # of a side, and px; more is another thing
 LEAST_CONTRAST = 3.0  # times the noise
 UNSETTLED = 200.0  # of the scatter: a step's gain in squares that is worth more than a few hundredths of a px
@@ -44,21 +44,49 @@ def measure_tags(picture: Picture, target: AprilGrid, tags: NDArray[np.int64], c
 
     Nothing but the pixels along the tags' sides is looked at: first a few, until corners and blur are roughly known.
     """
+    sides, rough = _fitted(picture, target, tags, corners, FEW_LINES, None)
+    near, _ = _crossings(sides, rough)
+    points = target_points(target)[:, :2].reshape(-1, 4, 2)[tags].reshape(-1, 2)
+    view = view_of_plane(points, near.reshape(-1, 2))
+    bent = None if view is None else bent_view(view, points, near.reshape(-1, 2), picture.middle)
+    sides = sides_of(target, tags, near)
+    strips = strips_along(picture, sides, rough.blur, np.zeros_like(sides.lengths), MANY_LINES)
+    return _judged(picture, corners, sides, fit_tags(strips, _courses(target, tags, sides, bent), rough.look))
+
+
+def track_tags(
+    picture: Picture, target: AprilGrid, tags: NDArray[np.int64], corners: Floats, view: BentView
+) -> TagCorners:
+    """Measure tags as `measure_tags` does, but by fewer pixels, as a view tells already how the lens bends sides."""
+    return _judged(picture, corners, *_fitted(picture, target, tags, corners, TRACKED_LINES, view))
+
+
+def _fitted(
+    picture: Picture,
+    target: AprilGrid,
+    tags: NDArray[np.int64],
+    corners: Floats,
+    lines: int,
+    view: BentView | None,
+) -> tuple[Sides, TagFit]:
+    """Fit tags whose corners and blur are roughly known to so many lines of pixels along each side."""
     unknown = ROUGH + ROUGH_BOW * np.linalg.norm(corners[:, AFTER] - corners, axis=-1)
     near, blur, look = corners, FIRST_BLUR, np.empty((0, 6))
     for _ in range(MOST_TRIALS):
         sides = sides_of(target, tags, near)
-        strips = strips_along(picture, sides, blur, unknown, FEW_LINES)
-        fit = fit_tags(strips, None, look if len(look) else first_look(strips, blur))
-        near, _ = _crossings(sides, fit)
+        strips = strips_along(picture, sides, blur, unknown, lines)
+        courses = None if view is None else _courses(target, tags, sides, view)
+        fit = fit_tags(strips, courses, look if len(look) else first_look(strips, blur))
         look, thought, blur = fit.look, blur, fit.blur
         if blur < MUCH_BLURRED * thought:
             break
-    sides = sides_of(target, tags, near)
-    strips = strips_along(picture, sides, blur, np.zeros_like(unknown), MANY_LINES)
-    fit = fit_tags(strips, _courses(picture, target, tags, sides), look)
-    pixels, covariances = _crossings(sides, fit)
+        near, _ = _crossings(sides, fit)
+    return sides, fit
 
+
+def _judged(picture: Picture, corners: Floats, sides: Sides, fit: TagFit) -> TagCorners:
+    """Give the corners of fitted tags, and tell which of these are tags near to `corners` (n, 4, 2)."""
+    pixels, covariances = _crossings(sides, fit)
     shortest = sides.lengths.min(axis=1)
     found = np.abs(pixels - corners).max(axis=(1, 2)) < np.maximum(MOST_MOVED * shortest, MAY_MOVE)
     found &= (fit.unsettled < UNSETTLED) & (fit.contrast > LEAST_CONTRAST * picture.noise)
@@ -68,17 +96,13 @@ def measure_tags(picture: Picture, target: AprilGrid, tags: NDArray[np.int64], c
     return TagCorners(pixels, covariances + UNMODELLED_VARIANCE * np.eye(2), found)
 
 
-def _courses(picture: Picture, target: AprilGrid, tags: NDArray[np.int64], sides: Sides) -> Floats:
+def _courses(target: AprilGrid, tags: NDArray[np.int64], sides: Sides, view: BentView | None) -> Floats:
     """Say how the lens bends sides: as it does the places of all corners. The courses (n, 4, 2) are `fit_tags`'s."""
-    plane = target_points(target)[:, :2].reshape(-1, 4, 2)[tags]
-    points, pixels = plane.reshape(-1, 2), sides.corners.reshape(-1, 2)
-    view = view_of_plane(points, pixels)
     if view is None:
         return np.zeros((*sides.lengths.shape, 2))
+    plane = target_points(target)[:, :2].reshape(-1, 4, 2)[tags]
     along = np.array([0, 0.25, 0.75, 1])[:, None]
-    seen = bent_view(view, points, pixels, picture.middle).project(
-        plane[:, :, None] + along * (plane[:, AFTER] - plane)[:, :, None]
-    )
+    seen = view.project(plane[:, :, None] + along * (plane[:, AFTER] - plane)[:, :, None])
     first, last = seen[:, :, :1], seen[:, :, 3:]
     off = seen[:, :, 1:3] - first - along[1:3] * (last - first)
     early, late = np.moveaxis((off @ sides.normals[..., None])[..., 0], -1, 0)

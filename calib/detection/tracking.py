@@ -20,7 +20,7 @@ from calib.detection.shifts import moved_together, shifts_of
 from calib.detection.smooth import smooth
 from calib.detection.sparse_corners import sparse_corners
 from calib.detection.sparse_disks import SparseDisks, sparse_centroids
-from calib.detection.tag_corners import measure_tags
+from calib.detection.tag_corners import track_tags
 from calib.detection.window import Window, window_on
 from calib.errors import DetectionError
 from calib.targets import AprilGrid, AsymmetricCircleGrid, CircleGrid, Target, target_points
@@ -142,7 +142,7 @@ def _measured(
             paper, ink = looks.paper[chosen], looks.ink[chosen]
             measured = _disks(window, target, places.edges[chosen], near, paper, ink)
         case AprilGrid():
-            measured = _tags(window, target, near, chosen)
+            measured = _tags(window, target, near, places.view, chosen)
         case _:
             measured = _corners(window, marks, places, looks, chosen)
     pixels, covariances, good = measured
@@ -197,8 +197,10 @@ def _corners(
     return _Measured(found.pixels[:, None], found.covariances[:, None], good[:, None])
 
 
-def _tags(window: Window, target: AprilGrid, near: Array, chosen: NDArray[np.int64]) -> _Measured:
+def _tags(
+    window: Window, target: AprilGrid, near: Array, view: BentView, chosen: NDArray[np.int64]
+) -> _Measured:
     picture = Picture(np.empty((0, 0), np.uint8), window.values, window.noise)
-    found = measure_tags(picture, target, chosen, near)
+    found = track_tags(picture, target, chosen, near, view)
     good = np.repeat(found.found[:, None], near.shape[1], axis=1)
     return _Measured(found.pixels, found.covariances, good)
