@@ -158,15 +158,14 @@ def _shown(fit: GreyFit, noise: float) -> NDArray[np.bool_]:
 
 def _patches(picture: Picture, crossings: Crossings, width: float) -> tuple[Patches, tuple[Singles, Singles]]:
     """Take the pixels along both edges of each crossing; and how far (n, m) they are to the right of either."""
-    reach = crossings.lengths[..., None] * crossings.directions
-    along = [strips(picture, crossings.pixels, -reach[:, edge], reach[:, edge], width) for edge in range(2)]
-    x, y, values, used = (
-        np.concatenate([getattr(each, field.name) for each in along], axis=1) for field in fields(Patches)
-    )
+    n = len(crossings.pixels)
+    reach = (crossings.lengths[..., None] * crossings.directions).reshape(-1, 2)
+    along = strips(picture, np.repeat(crossings.pixels, 2, axis=0), -reach, reach, width)
+    x, y, values, used = (getattr(along, field.name).reshape(n, -1) for field in fields(Patches))
     one, other = crossings.heights(x, y)
     # Where the strips overlap, a pixel belongs to the edge that it is nearer to.
     nearer = np.abs(one) <= np.abs(other)
-    m = along[0].x.shape[1]
+    m = x.shape[1] // 2
     used[:, :m] *= nearer[:, :m]
     used[:, m:] *= ~nearer[:, m:]
     return Patches(x, y, values, used), (one, other)
