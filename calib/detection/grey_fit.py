@@ -52,13 +52,20 @@ class GreyFit:
 
 
 def fit_grey_values(
-    picture: Picture, patches: Patches, shape: Shape, start: Floats, least: Floats, light: Light
+    picture: Picture,
+    patches: Patches,
+    shape: Shape,
+    start: Floats,
+    least: Floats,
+    light: Light,
+    still: float = STANDS_STILL,
 ) -> GreyFit:
     """Fit light x (mean + step x shape) to the pixels of each piece by Gauss-Newton steps.
 
     `shape` gives from parameters (n, k), which are `least` (k,) or more, the drawing S (n, m) between -1 and 1, and
     its derivatives (n, k, m). The light is a plane, 1 at the piece's origin. What the camera clips, the drawing
     clips as well. The covariance is that of the grey values' scatter about the drawing, of rounding at the least.
+    A step in which no shape changes by more than `still` is the last.
     """
     lowest, highest = picture.extremes
     n, k = start.shape
@@ -95,7 +102,7 @@ def fit_grey_values(
         fitted = fitted + change
         fitted[:, :k] = np.maximum(before + np.clip(change[:, :k], -LONGEST_STEP, LONGEST_STEP), least)
         moved = np.abs(fitted[:, :k] - before).max(axis=1)
-        if moved.max(initial=0.0) < STANDS_STILL:
+        if moved.max(initial=0.0) < still:
             break
         drawn, slopes = shape(fitted[:, :k])
     freedom = np.maximum(used.sum(axis=1) - (k + 4), 1)

@@ -18,6 +18,7 @@ APART = 1.42  # px; two places further apart than a pixel's diagonal are never i
 ACROSS = APART * np.arange(-3, 4)  # px from the edge
 ALONG = np.array([-1.0, -0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0.6, 0.8, 1.0])  # of what is free of other corners
 CLEAR_OF_BLUR = 1.5  # px
+STANDS_STILL = 0.1  # px; the next step would be less than such points scatter
 
 
 class SparseCorners(NamedTuple):
@@ -50,7 +51,7 @@ def sparse_corners(
     )
     # Nothing of the picture is looked at but the patches.
     seen = Picture(np.empty((0, 0), np.uint8), patches.values, noise)
-    fit = fit_grey_values(seen, patches, shape, start, least, light)
+    fit = fit_grey_values(seen, patches, shape, start, least, light, STANDS_STILL)
     return SparseCorners(
         crossings.pixels + fit.parameters[:, :2],
         fit.covariances[:, :2, :2] + UNMODELLED_VARIANCE * np.eye(2),
