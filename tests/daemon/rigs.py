@@ -99,7 +99,7 @@ cx = "240 px"
 cy = "178 px"
 
 [simulation.camera.picture]
-frame_rate = "60 Hz"
+frame_rate = "{frame_rate}"
 defocus = "{defocus}"
 """
 
@@ -117,6 +117,7 @@ def write_profile(
     max_reading_age: str = "2 s",
     defocus: str = "0.5 px",
     reach: float = 12.0,
+    frame_rate: str = "60 Hz",
 ) -> Path:
     """Write the small rig's profile into `folder` and return the file."""
     path = folder / "small-rig.toml"
@@ -129,6 +130,7 @@ def write_profile(
             max_reading_age=max_reading_age,
             defocus=defocus,
             reach=reach,
+            frame_rate=frame_rate,
         ),
         encoding="utf-8",
     )

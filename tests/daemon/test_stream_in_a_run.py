@@ -24,7 +24,8 @@ from tests.daemon.rigs import small_rig
 
 @pytest.fixture
 def profile(tmp_path: Path) -> Profile:
-    return small_rig(tmp_path, time_scale=1.0, velocity=400.0)
+    # As many pictures a second as leave time for everything else.
+    return small_rig(tmp_path, time_scale=1.0, velocity=400.0, frame_rate="15 Hz")
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def devices(
     request: pytest.FixtureRequest, profile: Profile, simulated: Devices, emulator: StreamEmulator
 ) -> Devices:
     patience = getattr(request, "param", "2 s")
-    options = StreamOptions(url=emulator.url, latency="1500 ms", exposure="10 ms", timeout=patience)
+    options = StreamOptions(url=emulator.url, latency="1 s", exposure="10 ms", timeout=patience)
     context = DriverContext(simulated.clock)
     return dataclasses.replace(simulated, camera=StreamCamera.create(profile.camera.spec, options, context))
 
@@ -105,7 +106,7 @@ async def test_a_run_through_a_stream_that_falls_behind_finds_the_truth(
     run = await service.runs.start("anna", "by the network")
     async for event in service.runs.events(run.id):
         if event.type == "joint" and event.joint == "pan":
-            emulator.delay(1.0)
+            emulator.delay(0.5)
     ended = await service.runs.get(run.id)
     assert ended.error is None
     world = service.rig.world
