@@ -132,7 +132,7 @@ class Machine:
         self.homed.difference_update(names)
         command = f"$H{self._axis_options[name].letter}" if self._one_by_one else "$H"
         self._link.give_up_by(RESET)
-        self.homing = asyncio.ensure_future(self._home(name, command, names))
+        self.homing = asyncio.ensure_future(self._home(name, command, names, self._link.halts))
         self.homing.add_done_callback(_retrieve)
 
     def homing_is_over(self) -> bool:
@@ -202,9 +202,10 @@ class Machine:
         self._restarts_before = self._restarts
         self._resetting = False
 
-    async def _home(self, name: str, command: str, names: list[str]) -> None:
+    async def _home(self, name: str, command: str, names: list[str], halts: int) -> None:
         try:
-            await self._ask(name, command, self._link.halts, self._options.homing_timeout)
+            await self._link.status()  # whoever asked before is answered: from here on nobody is until it is homed
+            await self._ask(name, command, halts, self._options.homing_timeout)
             self.homed.update(names)
             self.homings += 1
             self._alarm = None

@@ -200,6 +200,35 @@ async def test_homing_says_that_it_moves_and_knows_no_position() -> None:
         await homing
 
 
+async def test_reading_on_and_on_does_not_take_homing_for_a_loss() -> None:
+    """Grbl answers no question until it is homed, not even one that came just before."""
+    async with opened({24: 60}, answer_timeout="300 ms") as table:
+
+        async def read_on() -> None:
+            while True:
+                await table.pan.read()
+                await asyncio.sleep(0.001)
+
+        reading = asyncio.create_task(read_on())
+        began = asyncio.get_running_loop().time()
+        await table.slide.home()
+        assert asyncio.get_running_loop().time() - began > 0.3, "it was homed before anybody could miss it"
+        assert not reading.done()
+        reading.cancel()
+
+
+async def test_homing_that_is_stopped_before_it_is_sent_does_not_begin() -> None:
+    async with opened(report_interval="200 ms") as table:
+        before = table.shaft()
+        homing = asyncio.create_task(table.slide.home())
+        await until(lambda: table.slide._machine.homing is not None)
+        await table.slide.stop()
+        with pytest.raises(MotionStoppedError):
+            await homing
+        await asyncio.sleep(0.1)
+        assert table.shaft() == before
+
+
 async def test_all_axes_are_homed_at_once_and_not_once_more_for_the_second() -> None:
     async with opened() as table:
         await asyncio.gather(table.slide.home(), table.pan.home())
