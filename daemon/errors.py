@@ -36,6 +36,8 @@
 Every message is one sentence that says what happened and what to do.
 """
 
+from collections.abc import Sequence
+
 
 class DaemonError(Exception):
     """The daemon could not do what was asked of it."""
@@ -67,6 +69,11 @@ class TimeNotCoveredError(RigError):
 
 class StandstillError(RigError):
     """A stop was sent, and some axis could not be confirmed to stand; the message says which and why."""
+
+    def __init__(self, message: str, reasons: Sequence[str] = ()) -> None:
+        """`reasons` are the drivers' sentences that the message has in it."""
+        super().__init__(message)
+        self.reasons = tuple(reasons)
 
 
 class LeaseError(DaemonError):

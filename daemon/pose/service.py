@@ -17,6 +17,7 @@ from daemon.pose.active import ActiveCalibration, Poses
 from daemon.pose.answers import fields, past_fields, written_list
 from daemon.rig import PastReadings, Rig, RigSnapshot
 from daemon.rig.utc import rfc3339
+from daemon.rig.wording import because
 from drivers.errors import DeviceLostError, NotHomedError
 
 logger = logging.getLogger(__name__)
@@ -135,7 +136,7 @@ class PoseService:
         """Return the readings' age (s); raises unless every one of them can be believed."""
         for axis in snapshot.axes:
             if axis.lost is not None:
-                raise DeviceLostError(f"axis '{axis.spec.name}' cannot be read: {axis.lost}")
+                raise DeviceLostError(because(f"axis '{axis.spec.name}'", "cannot be read", axis.lost))
         age, allowed = self._rig.age(snapshot), self._rig.profile.procedure.max_reading_age
         if age is None or age > allowed:
             what = "there is no reading yet" if age is None else f"the latest reading is {age:.3g} s old"

@@ -118,7 +118,7 @@ class Observer:
                     f"axis '{axis.spec.name}' moves when it should stand: find out who moves it"
                 )
             if axis.fault is not None:
-                raise DeviceFaultError(f"axis '{axis.spec.name}' is in fault: {axis.fault}")
+                raise DeviceFaultError(f"axis '{axis.spec.name}': {axis.fault}")
             if axis.position is None:
                 raise MotionError(f"axis '{axis.spec.name}' no longer knows where it is: home it")
         return snapshot

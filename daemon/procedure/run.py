@@ -17,6 +17,7 @@ from daemon.procedure.conclusion import Conclusion
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Finished, StateChanged
 from daemon.procedure.gate import Gate
+from daemon.rig.wording import unconfirmed
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
 from drivers.cancellation import finish
 from drivers.errors import DriverError
@@ -116,8 +117,8 @@ class Run:
         if state is not RunState.SUCCEEDED:
             try:
                 await self.assignment.halt()
-            except StandstillError as unconfirmed:
-                error = f"{error}; {unconfirmed}"
+            except StandstillError as unsure:
+                error = f"{error}; {unconfirmed(unsure.reasons, str(error))}"
         state, error = self.assignment.end(state, error)
         kept: CalibrationRecord | None = None
         try:

@@ -5,6 +5,7 @@ In the order in which a state travels:
     devices           profile -> drivers, clock, simulated world
     device_owner      connecting, losing and finding a device;  controller_owner, camera_owner  the two kinds
     snapshot          what is known at one instant;  utc  its time stamps in UTC;  history  past instants
+    wording           a loss in a sentence that names each device once
     stop_latch        nothing moves after a stop before it is acknowledged
     rig               all of it together
 """

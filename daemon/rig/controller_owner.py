@@ -10,6 +10,7 @@ from daemon.operation.log_fields import log_fields
 from daemon.rig.device_owner import DeviceOwner
 from daemon.rig.snapshot import AxisSnapshot, Side
 from daemon.rig.stop_latch import StopLatch
+from daemon.rig.wording import because
 from drivers.axis import Axis, AxisController, AxisSpec, AxisState
 from drivers.cancellation import finish
 from drivers.errors import AxisBusyError, DeviceLostError, DriverError, MotionStoppedError
@@ -84,7 +85,7 @@ class ControllerOwner(DeviceOwner):
     def require_idle(self, name: str) -> None:
         """Raise DeviceLostError or AxisBusyError unless a motion of this axis may begin."""
         if self.lost is not None:
-            raise DeviceLostError(f"axis '{name}' cannot move: {self.lost}")
+            raise DeviceLostError(because(f"axis '{name}'", "cannot move", self.lost))
         if self._axes[name].motion is not None:
             raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
 
@@ -133,6 +134,8 @@ class ControllerOwner(DeviceOwner):
         self._publish()
         try:
             await _watch(motion)
+            if motion.cancelled() and self.lost is not None:
+                raise DeviceLostError(because(f"axis '{name}'", "did not reach its target", self.lost))
             if motion.cancelled():
                 raise MotionStoppedError(f"axis '{name}' was stopped before the motion reached its target")
             motion.result()

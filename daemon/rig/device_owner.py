@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Final, Literal
 
 from daemon.rig.snapshot import DeviceSnapshot
+from daemon.rig.wording import because
 from drivers.cancellation import finish
 from drivers.driver import Cautious
 from drivers.errors import DriverError
@@ -72,7 +73,7 @@ class DeviceOwner(ABC):
     def _lose(self, error: Exception) -> None:
         expected = isinstance(error, DriverError | OSError)
         sentence = str(error) if expected else f"{type(error).__name__} in the driver: {error}"
-        sentence = f"{self.kind} '{self.name}' is lost: {sentence}"
+        sentence = because(f"{self.kind} '{self.name}'", "is lost", sentence)
         if sentence != self.lost:
             logger.warning(sentence, exc_info=None if expected else error)
         self.lost = sentence

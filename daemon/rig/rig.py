@@ -16,6 +16,7 @@ from daemon.rig.history import PastReadings, ReadingHistory
 from daemon.rig.snapshot import AxisSnapshot, RigSnapshot
 from daemon.rig.stop_latch import StopLatch
 from daemon.rig.utc import UtcClock
+from daemon.rig.wording import because, unconfirmed
 from drivers.axis import AxisController, AxisSpec
 from drivers.camera import Frame
 from drivers.cancellation import finish
@@ -171,7 +172,7 @@ class Rig:
             snapshot = self.snapshot
             for axis in snapshot.axes:
                 if axis.lost is not None:
-                    raise DeviceLostError(f"axis '{axis.spec.name}' cannot be read: {axis.lost}")
+                    raise DeviceLostError(because(f"axis '{axis.spec.name}'", "cannot be read", axis.lost))
             if snapshot.timestamp is not None and snapshot.timestamp >= after:
                 return snapshot
             for owner in self._controllers:
@@ -230,7 +231,8 @@ class Rig:
     def _require_homed(self, name: str) -> None:
         axis = self.snapshot.axis(name)
         if not axis.homed or axis.position is None:
-            raise NotHomedError(f"axis '{name}' is not homed: home it before moving it to a position")
+            why = "" if axis.fault is None else f" ({axis.fault})"
+            raise NotHomedError(f"axis '{name}' is not homed{why}: home it before moving it to a position")
 
     async def _together(self, actions: Mapping[str, Action]) -> None:
         try:
@@ -245,12 +247,9 @@ class Rig:
         groups = [(owner, [name for name in owner.axes if name in names]) for owner in self._controllers]
         answers = await asyncio.gather(*(owner.stop(axes) for owner, axes in groups if axes))
         # Axes of one device often have one reason; a driver's names its axis itself.
-        unconfirmed = list(dict.fromkeys(reason for answer in answers for reason in answer.values()))
-        if unconfirmed:
-            raise StandstillError(
-                f"a stop was sent, but a standstill could not be confirmed: {'; '.join(unconfirmed)}; "
-                "look at the rig before you go near it"
-            )
+        reasons = list(dict.fromkeys(reason for answer in answers for reason in answer.values()))
+        if reasons:
+            raise StandstillError(unconfirmed(reasons), reasons)
 
     async def _close(self) -> None:
         for owner in self._controllers:

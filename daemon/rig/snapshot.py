@@ -84,7 +84,7 @@ class RigSnapshot:
         """Sentences on everything that is lost or in fault."""
         lost = [device.lost for device in self.devices if device.lost is not None]
         return lost + [
-            f"axis '{axis.spec.name}' is in fault: {axis.fault}"
+            f"axis '{axis.spec.name}': {axis.fault}"
             for axis in self.axes
             if axis.fault is not None and axis.lost is None
         ]

@@ -215,7 +215,7 @@ async def test_an_alarm_while_the_axes_stand_fails_the_run_in_its_words(
             break
     run = await service.runs.wait(run.id)
     assert run.error is not None
-    assert "axis 'pan' is in fault: the controller is in alarm" in run.error
+    assert "axis 'pan': the controller is in alarm" in run.error
 
 
 async def test_a_run_waits_until_what_its_starter_has_moved_stands(service: Service) -> None:
