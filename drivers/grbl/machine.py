@@ -204,7 +204,8 @@ class Machine:
 
     async def _home(self, name: str, command: str, names: list[str], halts: int) -> None:
         try:
-            await self._link.status()  # whoever asked before is answered: from here on nobody is until it is homed
+            # Whoever asked before is answered first: from here on nobody is, until it is homed.
+            await self._link.status()
             await self._ask(name, command, halts, self._options.homing_timeout)
             self.homed.update(names)
             self.homings += 1

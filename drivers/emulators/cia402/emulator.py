@@ -80,7 +80,7 @@ class Cia402Emulator:
                 "lossy": Fault("this share of the drives' frames is lost", self.lossy, "SHARE"),
                 "heartbeat-gone": Fault("the drive sends no heartbeat", self.stop_heartbeat, "AXIS"),
                 "fail": Fault("the drive sends an emergency and goes into fault", self.fail, "AXIS CODE"),
-                "stall": Fault("the axis's next motion gets stuck half way", self.stall, "AXIS"),
+                "stall": Fault("the axis's motion, or its next one, gets stuck half way", self.stall, "AXIS"),
                 "disable": Fault("the drive's enable input opens", self.disable, "AXIS"),
                 "reset": Fault("the drive's power goes off and on", self.reset, "AXIS"),
                 "gone": Fault("the drive has no power", self.take_away, "AXIS"),
@@ -129,7 +129,7 @@ class Cia402Emulator:
         self._node(axis).servo.fail(int(code, 0))
 
     def stall(self, axis: str) -> None:
-        """Let the next motion get stuck."""
+        """Let the motion under way, or the next one, get stuck."""
         self._node(axis).servo.stall()
 
     def disable(self, axis: str) -> None:

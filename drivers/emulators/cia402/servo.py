@@ -101,8 +101,12 @@ class Servo:
             self.mode = mode
 
     def stall(self) -> None:
-        """Let the next motion get stuck half way."""
-        self._stall_next = True
+        """Let the motion under way, or else the next one, get stuck half way through what is left of it."""
+        now = self._clock.now()
+        if now < self._demand.ends:
+            self._stuck_from = (now + self._demand.ends) / 2
+        else:
+            self._stall_next = True
 
     def fail(self, code: int) -> None:
         """Stop, go into fault, and say why."""

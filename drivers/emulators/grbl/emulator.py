@@ -158,9 +158,7 @@ class GrblEmulator:
 
     def stall(self, axis: str) -> None:
         """Block an axis's motor."""
-        motor = self._motor(axis)
-        motor.count_from(motor.position)
-        motor.stalled = True
+        self._motor(axis).stall()
 
     def slip(self, axis: str, distance: float | str) -> None:
         """Let an axis lose steps."""

@@ -56,6 +56,12 @@ class Motor:
         """Stop in no time, as when the pulses cease."""
         self.count_from(self.position)
 
+    def stall(self) -> None:
+        """Turn no more, and be counted on."""
+        now = self._now()
+        self.shaft.drive(rest(self.shaft.motor(now), now))
+        self.stalled = True
+
     def slip(self, distance: float) -> None:
         """Lose the steps of `distance`: the shaft jumps, the count does not."""
         now = self._now()

@@ -1,0 +1,37 @@
+"""A stepper table that fails in the course of a run: the run fails with a sentence, and nothing moves afterwards.
+
+Lost steps and a motor that stands are no faults here: the table counts what it sends, and cannot see them.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from drivers.emulators.grbl import GrblEmulator
+from tests.daemon.courses import Equipment, Faults, expect_failures
+
+TABLE = Equipment(
+    driver="grbl",
+    place="port",
+    options={"answer_timeout": "1 s", "homing_timeout": "5 s", "report_interval": "20 ms"},
+    axes={
+        "slide": {"letter": "X", "machine_zero": "100 mm"},
+        "pan": {"letter": "Y", "machine_zero": "20 deg"},
+    },
+)
+SILENT = r"has not answered for 1 s|does not come back from a reset"
+FAULTS: Faults = {
+    "unplugged": (GrblEmulator.unplug, r"the port .* is gone"),
+    "mute": (GrblEmulator.mute, SILENT),
+    "late": (lambda table: table.late(2.0), SILENT),
+    "garbage": (GrblEmulator.garble, SILENT),
+    "dropped bytes": (GrblEmulator.drop, SILENT),
+    "reset": (GrblEmulator.reset, r"has restarted and lost its position|knows where it is: home it"),
+    "limit switch": (GrblEmulator.limit, r"in alarm 1: a limit switch tripped|knows where it is: home it"),
+    "alarm": (lambda table: table.alarm(3), r"in alarm 3|knows where it is: home it"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+async def test_a_fault_of_the_table_ends_the_run_with_a_sentence(fault: str, tmp_path: Path) -> None:
+    await expect_failures(TABLE, FAULTS[fault], tmp_path)
