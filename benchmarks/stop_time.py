@@ -22,7 +22,7 @@ from drivers.axis import Axis
 from drivers.errors import MotionStoppedError
 from drivers.simulated.shaft import Shaft
 
-RIGS: Final = ("grbl-table",)
+RIGS: Final = ("grbl-table", "cia402-pan-tilt")
 LIMIT: Final = 50.0
 """Milliseconds that a stop may take to reach its device."""
 RAMP: Final = 0.3
