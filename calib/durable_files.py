@@ -13,9 +13,13 @@ def write_durably(path: Path, data: bytes) -> None:
     try:
         temporary.write_bytes(data)
         put_in_place(temporary, path)
-    except BaseException:
+    except BaseException as error:
         # What is left of it would only keep a full disk full.
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise OSError(
+                error.errno, error.strerror, str(path)
+            ) from error  # which file, a write does not say
         raise
 
 

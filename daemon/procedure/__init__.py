@@ -7,7 +7,7 @@ In the order in which a run goes:
     assignment    what it has to do: measure and solve, or solve what there is
     survey        homing, sweeps and free views;  observation  one view
     conclusion    solving and verification;  worker  a thread for them that can be abandoned
-    events        what it tells;  event_log  told in order, kept, followed
+    events        what it tells;  event_log  told in order, kept, followed;  event_file  their lines on disk
 """
 
 from daemon.procedure.events import RunEvent

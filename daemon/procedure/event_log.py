@@ -1,6 +1,5 @@
 """A run's events in order: kept, written beside its session, and followed by any number of readers."""
 
-import logging
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Self
@@ -9,10 +8,9 @@ from pydantic import ValidationError
 
 from calib.durable_files import make_folder_durably, write_durably
 from daemon.broadcast import Broadcast
+from daemon.procedure.event_file import EventFile
 from daemon.procedure.events import EVENT, Finished, RunEvent
 from daemon.store import RunRecord
-
-logger = logging.getLogger(__name__)
 
 Told = Callable[[RunEvent], None]
 
@@ -25,15 +23,18 @@ class EventLog:
     def __init__(self, run_id: str, folder: Path, earlier: Sequence[RunEvent] = ()) -> None:
         self.run_id = run_id
         self._events = list(earlier)
-        self._file = folder / FILE_NAME
+        self._file = EventFile(folder / FILE_NAME)
         self._changed = Broadcast()
         self._ended = False
         self._listener: Told | None = None
 
     @classmethod
-    def reopen(cls, run: RunRecord, folder: Path) -> Self:
-        """Go on with the events of a run that is over; raises OSError."""
-        earlier = past_events(run, folder)
+    def reopen(cls, run: RunRecord, folder: Path, told: "EventLog | None" = None) -> Self:
+        """Go on with the events of a run that is over; raises OSError.
+
+        `told` is their log where this daemon told them: a full disk may have kept some of them from the file.
+        """
+        earlier = past_events(run, folder) if told is None else told._events
         # The last line may be cut off, and an end may be missing that readers were told of.
         lines = "".join(event.model_dump_json() + "\n" for event in earlier)
         make_folder_durably(folder)
@@ -51,12 +52,7 @@ class EventLog:
         self._ended = event.type == "finished"
         numbered = event.model_copy(update={"run_id": self.run_id, "sequence": len(self._events) + 1})
         self._events.append(numbered)
-        try:
-            with self._file.open("a", encoding="utf-8") as file:
-                file.write(numbered.model_dump_json() + "\n")
-        except OSError as error:
-            # The session and the store are what counts; a run does not end for want of its diary.
-            logger.warning("%s: an event could not be written: %s", self._file, error.strerror)
+        self._file.append(numbered.model_dump_json())
         if self._listener is not None:
             self._listener(numbered)
         self._changed.fire()

@@ -1,6 +1,7 @@
 """The runs of a rig: one at a time, each under a lease of its own."""
 
 import asyncio
+import contextlib
 import json
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -142,6 +143,9 @@ class RunManager:
                 RunState.INTERRUPTED,
                 "the daemon was shut down: resume it, or solve the views taken so far as they are",
             )
+        if self._latest is not None:
+            with contextlib.suppress(StoreError):  # the next daemon finds it unfinished then
+                await self._latest.store_end()
 
     async def _begin(
         self,
@@ -151,6 +155,8 @@ class RunManager:
         token: str | None = None,
     ) -> RunRecord:
         """Start a run, under a lease of its own where it moves, once `take_up` has stored that it is under way."""
+        if self._latest is not None:
+            await self._latest.store_end()
         lease = self._leases.hand_over(f"run {record.id}", record.note, token) if assignment.moves else None
         try:
             log = await take_up()
@@ -168,8 +174,9 @@ class RunManager:
     async def _take_up(self, before: RunRecord) -> EventLog:
         """Store that a run is under way again, and return its events so far."""
         folder = self._store.session_folder(before)
+        told = self._latest.log if self._latest is not None and self._latest.record.id == before.id else None
         try:
-            log = await asyncio.to_thread(EventLog.reopen, before, folder)
+            log = await asyncio.to_thread(EventLog.reopen, before, folder, told)
         except OSError as error:
             raise StoreError(f"{folder}: the run's events cannot be written: {error.strerror}") from error
         await self._store.change_run(before.id, RunState.RUNNING)

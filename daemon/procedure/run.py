@@ -1,6 +1,8 @@
 """One calibration run, from its first move to its last word."""
 
 import asyncio
+import contextlib
+import errno
 import logging
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +12,7 @@ from uuid import uuid4
 from calib import Calibration
 from calib.documents import write_json
 from calib.errors import CalibError
-from daemon.errors import DaemonError, RunStateError, StandstillError
+from daemon.errors import DaemonError, RunStateError, StandstillError, StoreError
 from daemon.operation.log_fields import log_fields
 from daemon.procedure.assignment import Assignment
 from daemon.procedure.conclusion import Conclusion
@@ -25,6 +27,13 @@ from drivers.errors import DriverError
 logger = logging.getLogger(__name__)
 
 OnEnd = Callable[[CalibrationRecord | None, Calibration | None], None]
+
+
+def unwritten(error: OSError) -> str:
+    """Return why what a run has measured or found could not be written, and what to do."""
+    if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+        return f"the disk is full: {error.filename} could not be written: make room, then resume the run"
+    return f"the session could not be written: {error.filename}: {error.strerror}"
 
 
 class Run:
@@ -47,6 +56,7 @@ class Run:
         self._ending: tuple[RunState, str] | None = None
         self._task: asyncio.Task[None] | None = None
         self._begun = False
+        self._stored = True
 
     def start(self) -> asyncio.Task[None]:
         """Begin; the task ends with the run and never fails."""
@@ -81,6 +91,13 @@ class Run:
         if self._task is not None:
             await asyncio.wait([self._task])
 
+    async def store_end(self) -> None:
+        """Store the run's end if the store did not take it when it came; raises StoreError."""
+        if not self._stored:
+            ended = self.record
+            self.record = await self._store.change_run(ended.id, ended.state, ended.error)
+            self._stored = True
+
     async def _execute(self) -> None:
         self._begun = True
         state, error, conclusion = RunState.SUCCEEDED, None, None
@@ -92,7 +109,7 @@ class Run:
         except (DaemonError, DriverError, CalibError) as failure:
             state, error = RunState.FAILED, str(failure)
         except OSError as failure:
-            state, error = RunState.FAILED, f"the session could not be written: {failure}"
+            state, error = RunState.FAILED, unwritten(failure)
         except Exception as failure:
             logger.exception("run '%s' failed", self.record.id)
             state, error = RunState.FAILED, f"an error in the program, which its log describes: {failure!r}"
@@ -125,9 +142,14 @@ class Run:
             kept = None if conclusion is None else await self._keep(conclusion, state)
             self.record = await self._store.change_run(self.record.id, state, error, calibration=kept)
         except (DaemonError, OSError) as failure:
-            unstored = f"its end could not be stored: {failure}"
+            why = unwritten(failure) if isinstance(failure, OSError) else str(failure)
+            unstored = f"its end could not be stored: {why}"
             kept, error = None, unstored if error is None else f"{error}; {unstored}"
-            self.record = replace(self.record, state=RunState.FAILED, error=error, ended_at=datetime.now(UTC))
+            ended = RunState.FAILED if state is RunState.SUCCEEDED else state
+            self.record = replace(self.record, state=ended, error=error, ended_at=datetime.now(UTC))
+            self._stored = False
+            with contextlib.suppress(StoreError):
+                await self.store_end()
         if kept is None or conclusion is None:
             logger.warning("run '%s' %s: %s", self.record.id, self.record.state, error)
         else:

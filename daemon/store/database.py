@@ -122,8 +122,9 @@ class Database:
 
 
 def _reason_of(error: SQLAlchemyError) -> str:
-    """Return what SQLite said, without the statement that it said it of."""
-    return str(getattr(error, "orig", None) or error).splitlines()[0]
+    """Return what SQLite said, and what to do about a full disk, without the statement that it said it of."""
+    reason = str(getattr(error, "orig", None) or error).splitlines()[0]
+    return "the disk is full: make room" if reason == "database or disk is full" else reason
 
 
 def _make_durable(connection: Any, _record: Any) -> None:

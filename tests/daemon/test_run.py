@@ -288,22 +288,6 @@ async def test_a_session_that_cannot_be_solved_fails_the_run_and_stays(
     assert len(load_session(service.store.session_folder(run)).views) == 10
 
 
-async def test_a_full_disk_fails_the_run_and_leaves_a_session_that_loads(
-    service: Service, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    run = await service.runs.start()
-    async for event in service.runs.events(run.id):
-        if event.type == "view" and event.view == 1:
-            monkeypatch.setattr("calib.session_writer.write_durably", full)
-    run = await service.runs.get(run.id)
-    assert run.state is RunState.FAILED
-    assert "No space left on device" in (run.error or "")
-    assert len(load_session(service.store.session_folder(run)).views) == 2
-
-
 async def test_an_error_in_the_program_fails_the_run_too(
     service: Service, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
