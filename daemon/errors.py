@@ -24,12 +24,21 @@
     │   ├── LensUnknownError                   the calibration does not know the camera's lens
     │   └── UnknownCameraError (KeyError)      no camera of this name in the calibration
     ├── StoreError                             the database or its folder cannot be used
+    │   ├── FolderInUseError                   another activecam uses the data folder
     │   └── UnknownCalibrationError (KeyError) no calibration of this id
     ├── IdempotencyError
     │   ├── IdempotencyConflictError           this key was another request's
     │   ├── IdempotencyInProgressError         the first request of this key is still under way
     │   └── IdempotencyUnknownError            how the first request of this key ended is not known
     ├── BackupError                            a backup that cannot be made, or not be restored
+    ├── AccessError
+    │   ├── KeyRequiredError                   a request without a key, where one is asked for
+    │   ├── KeyUnknownError                    a key that was never one, or is none any more
+    │   ├── RoleRequiredError                  a key whose role does not allow this
+    │   ├── NoKeyError                         a key is asked for, and there is none
+    │   ├── KeyNameError                       a name that no key can have
+    │   ├── KeyExistsError                     there is a key of this name
+    │   └── UnknownKeyError (KeyError)         there is no key of this name
     ├── PrintError                             a target that cannot be drawn as large, or as finely, as asked
     └── ServeError                             the address cannot be served
 
@@ -144,6 +153,10 @@ class StoreError(DaemonError):
     """The database, or the folder it is in, cannot be used."""
 
 
+class FolderInUseError(StoreError):
+    """Another activecam uses the data folder."""
+
+
 class UnknownCalibrationError(StoreError, KeyError):
     """There is no calibration of this id."""
 
@@ -166,6 +179,38 @@ class IdempotencyUnknownError(IdempotencyError):
 
 class BackupError(DaemonError):
     """A backup cannot be written, is damaged, or cannot be restored where it was asked to."""
+
+
+class AccessError(DaemonError):
+    """Who asks may not do this, or the keys that tell are not as they need to be."""
+
+
+class KeyRequiredError(AccessError):
+    """A key is asked for, and none was shown."""
+
+
+class KeyUnknownError(AccessError):
+    """The key that was shown is none of those that there are."""
+
+
+class RoleRequiredError(AccessError):
+    """The key's role does not allow what was asked."""
+
+
+class NoKeyError(AccessError):
+    """A daemon that asks for a key is of no use without one."""
+
+
+class KeyNameError(AccessError):
+    """A key cannot have this name."""
+
+
+class KeyExistsError(AccessError):
+    """There is a key of this name already."""
+
+
+class UnknownKeyError(AccessError, KeyError):
+    """There is no key of this name."""
 
 
 class PrintError(DaemonError):

@@ -11,7 +11,7 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
-from daemon.errors import StoreError
+from daemon.errors import FolderInUseError, StoreError
 from daemon.store.copies import copy_database
 from daemon.store.folder_lock import lock_folder
 from daemon.store.migrations import migrate, schema_version
@@ -39,15 +39,17 @@ class Database:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
 
     @classmethod
-    async def open(cls, folder: Path) -> Self:
+    async def open(cls, folder: Path, *, beside_daemon: bool = False) -> Self:
         """Open or create the database in `folder`; one of an older schema is copied, then brought to today's.
+
+        With `beside_daemon` it is used beside the daemon that uses it, if one does, and keeps none out.
 
         Raises StoreError when the folder cannot be used, another daemon uses it, or the file is of a newer
         schema, or cannot be brought to today's; it is then as it was.
         """
         database = cls(folder)
         try:
-            await database._in_thread(database._open)
+            await database._in_thread(database._open_beside if beside_daemon else database._open)
         except BaseException:
             await database.close()
             raise
@@ -79,10 +81,36 @@ class Database:
 
     def _open(self) -> None:
         self._lock = lock_folder(self.folder)
-        self._engine = create_engine(f"sqlite:///{self.path}")
-        event.listen(self._engine, "connect", _make_durable)
-        event.listen(self._engine, "begin", _begin)
-        with self._engine.begin() as connection:
+        self._engine = self._connect()
+        self._bring_to_today(self._engine)
+
+    def _open_beside(self) -> None:
+        try:
+            self._open()
+        except FolderInUseError:
+            self._engine = self._connect()
+            with self._engine.begin() as connection:
+                version: int = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
+            if version != schema_version():
+                raise StoreError(
+                    f"{self.path}: used by an activecam of another version (schema {version}, this one knows "
+                    f"{schema_version()}): use that version, or stop it first"
+                ) from None
+        self._let_go()
+
+    def _let_go(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def _connect(self) -> Engine:
+        engine = create_engine(f"sqlite:///{self.path}")
+        event.listen(engine, "connect", _make_durable)
+        event.listen(engine, "begin", _begin)
+        return engine
+
+    def _bring_to_today(self, engine: Engine) -> None:
+        with engine.begin() as connection:
             version: int = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
             if version == 0:
                 Table.metadata.create_all(connection)
@@ -93,7 +121,7 @@ class Database:
                 f"{schema_version()}): install that version, or choose another --data"
             )
         if 0 < version < schema_version():
-            self._migrate(self._engine, version)
+            self._migrate(engine, version)
 
     def _migrate(self, engine: Engine, version: int) -> None:
         copy = self.folder / f"activecam.schema-{version}.db"
@@ -117,8 +145,7 @@ class Database:
     def _close(self) -> None:
         if self._engine is not None:
             self._engine.dispose()
-        if self._lock is not None:
-            self._lock.close()
+        self._let_go()
 
 
 def _reason_of(error: SQLAlchemyError) -> str:
@@ -137,4 +164,5 @@ def _make_durable(connection: Any, _record: Any) -> None:
 
 
 def _begin(connection: Connection) -> None:
-    connection.exec_driver_sql("BEGIN")
+    # A transaction that began to read, and writes when another process has written meanwhile, would be refused.
+    connection.exec_driver_sql("BEGIN IMMEDIATE")

@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import IO
 
 from calib.durable_files import make_folder_durably
-from daemon.errors import StoreError
+from daemon.errors import FolderInUseError, StoreError
 
 
 def lock_folder(folder: Path) -> IO[str]:
     """Make `folder` if need be and lock it until what is returned is closed.
 
-    Raises StoreError when it cannot be used, or another activecam uses it.
+    Raises StoreError when it cannot be used, and FolderInUseError when another activecam uses it.
     """
     try:
         make_folder_durably(folder)
@@ -22,7 +22,7 @@ def lock_folder(folder: Path) -> IO[str]:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         lock.close()
-        raise StoreError(
+        raise FolderInUseError(
             f"{folder}: another activecam uses this data folder: stop it, or choose another --data"
         ) from None
     return lock

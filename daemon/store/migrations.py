@@ -27,7 +27,19 @@ def _add_answers(connection: Connection) -> None:
     )
 
 
-MIGRATIONS: Final[tuple[Migration, ...]] = (_add_answers,)
+def _add_access(connection: Connection) -> None:
+    connection.exec_driver_sql(
+        "CREATE TABLE api_keys (name TEXT NOT NULL PRIMARY KEY, role TEXT NOT NULL, digest TEXT NOT NULL UNIQUE, "
+        "created_at DATETIME NOT NULL, last_used_at DATETIME)"
+    )
+    connection.exec_driver_sql(
+        "CREATE TABLE audit (id INTEGER NOT NULL PRIMARY KEY, time DATETIME NOT NULL, who TEXT, role TEXT NOT NULL, "
+        "address TEXT NOT NULL, method TEXT NOT NULL, path TEXT NOT NULL, asked TEXT NOT NULL, status INTEGER, "
+        "code TEXT)"
+    )
+
+
+MIGRATIONS: Final[tuple[Migration, ...]] = (_add_answers, _add_access)
 """The first takes schema 1 to schema 2, and so on."""
 
 

@@ -1,4 +1,4 @@
-"""Runs and calibrations, kept for good under the data folder."""
+"""Runs and calibrations, kept for good under the data folder; keys and the audit log beside them."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -10,7 +10,9 @@ from sqlalchemy.orm import Session
 
 from daemon.errors import UnknownCalibrationError, UnknownRunError
 from daemon.store.answers import StoredAnswers
+from daemon.store.audit import StoredAudit
 from daemon.store.database import Database
+from daemon.store.keys import StoredKeys
 from daemon.store.records import CalibrationRecord, CalibrationSummary, RunRecord, RunState
 from daemon.store.tables import CalibrationRow, RunRow
 
@@ -21,11 +23,13 @@ class Store:
     def __init__(self, database: Database) -> None:
         self._database = database
         self.answers = StoredAnswers(database)
+        self.keys = StoredKeys(database)
+        self.audit = StoredAudit(database)
 
     @classmethod
-    async def open(cls, folder: Path) -> Self:
+    async def open(cls, folder: Path, *, beside_daemon: bool = False) -> Self:
         """Open or create what is stored in `folder`; see `Database.open`."""
-        return cls(await Database.open(folder))
+        return cls(await Database.open(folder, beside_daemon=beside_daemon))
 
     async def close(self) -> None:
         """Let the database go."""

@@ -77,3 +77,32 @@ class CalibrationRow(Table):
     """What the held-out views said, as JSON."""
     active: Mapped[bool]
     run_id: Mapped[str | None]
+
+
+class ApiKeyRow(Table):
+    """An API key, of which the hash alone is kept."""
+
+    __tablename__ = "api_keys"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    role: Mapped[str]
+    digest: Mapped[str] = mapped_column(unique=True)
+    created_at: Mapped[datetime]
+    last_used_at: Mapped[datetime | None]
+
+
+class AuditRow(Table):
+    """What somebody did."""
+
+    __tablename__ = "audit"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    time: Mapped[datetime]
+    who: Mapped[str | None]
+    role: Mapped[str]
+    address: Mapped[str]
+    method: Mapped[str]
+    path: Mapped[str]
+    asked: Mapped[str]
+    status: Mapped[int | None]
+    code: Mapped[str | None]
