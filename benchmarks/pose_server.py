@@ -14,7 +14,7 @@ from fastapi import Request, Response
 
 from benchmarks.paper_rig import paper_profile, session_of_points
 from calib import solve
-from daemon.api import poses
+from daemon.api import poses, rules
 from daemon.server import serve
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
 
@@ -61,6 +61,7 @@ def _add_constant_route() -> None:
         return Response(json.dumps({"bytes": len(constant)}), media_type="application/json")
 
     path = CONSTANT.removeprefix("/api/v1")
+    rules.ROLES |= {f"GET {path}": rules.VIEWER, f"POST {path}": rules.VIEWER}
     routes = poses.router.routes
     poses.router.post(path, include_in_schema=False)(set_constant)
     poses.router.get(path, include_in_schema=False)(get_constant)

@@ -52,6 +52,10 @@ class ClientMotions:
             raise MotionStoppedError("the motion was stopped before its target, because its lease ended")
         motion.result()
 
+    async def stopped(self, lease: Lease) -> None:
+        """Return when whatever began under `lease`, which has ended, is over."""
+        await asyncio.gather(*self._under_way.get(lease.token, ()), return_exceptions=True)
+
     async def _begun(self, motion: asyncio.Task[None], axes: Collection[str]) -> None:
         while not motion.done() and not any(self._rig.axis(name).moving for name in axes):
             changed = asyncio.ensure_future(self._rig.changed.wait())

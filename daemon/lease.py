@@ -56,6 +56,19 @@ class LeaseDesk:
         self._hold(lease)
         return lease
 
+    def take_over(self, owner: str, note: str, ttl: float) -> tuple[Lease, Lease | None]:
+        """Give a new lease in place of another client's, which ends by that; return both.
+
+        Raises LeaseHeldError when a run holds it.
+        """
+        former = self._lease
+        if former is not None and former.ttl is None:
+            raise LeaseHeldError(f"'{former.owner}' holds the motion lease until it is over: cancel it first")
+        if former is not None:
+            logger.warning("'%s' takes the lease over from '%s'", owner, former.owner)
+            self._end(former)
+        return self.acquire(owner, note, ttl), former
+
     def hand_over(self, owner: str, note: str, token: str | None = None) -> Lease:
         """Give a lease without an end to a run, in place of its starter's, which `token` shows.
 

@@ -7,6 +7,7 @@ import logging
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable, Collection, Generator
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -26,6 +27,22 @@ GRACE: Final = 1.0
 """Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
 LARGEST_MESSAGE: Final = 64 * 1024
 """Bytes of a WebSocket message from a client; none that there is to send has any."""
+
+
+@dataclass(frozen=True, slots=True)
+class Door:
+    """How clients come in: the names that they may ask for, whether each shows a key, and TLS, if any.
+
+    `proxy` is whether what a proxy on this machine says of its clients is believed.
+    """
+
+    host_names: Collection[str] = ()
+    keys: bool = False
+    proxy: bool = False
+    tls: Tls | None = None
+
+
+LOCAL: Final = Door()
 
 
 class Server(uvicorn.Server):
@@ -61,27 +78,30 @@ def serve(
     on_ready: Callable[[str], None] | None = None,
     *,
     host_names: Collection[str] = (),
+    keys: bool = False,
     tls: Tls | None = None,
 ) -> None:
     """Serve the rig of `profile` until SIGINT or SIGTERM, with what is stored in `data`.
 
     `on_ready` is called with the address (http://host:port) when requests are taken; port 0 takes a free one.
-    `host_names` are names, beside `host`, under which clients may ask.
+    `host_names` are names, beside `host`, under which clients may ask. Beyond this machine each request must show
+    an API key; with `keys` on this machine as well, where a proxy then says for whom it asks.
     Raises ServeError, before anything is opened, when it cannot listen there or the files of `tls` are of no use;
-    StoreError and OptionsError.
+    StoreError, NoKeyError and OptionsError.
     """
     if tls is not None:
         tls.check()
     listening = bind(host, port)
-    if not ipaddress.ip_address(listening.getsockname()[0]).is_loopback:
-        logger.warning("whoever reaches %s can move the axes: nobody is asked who they are", host)
-        if tls is None:
-            logger.warning(
-                "whoever is on the network between can read and change what is sent: "
-                "serve with --tls-certificate and --tls-key"
-            )
+    local = ipaddress.ip_address(listening.getsockname()[0]).is_loopback
+    if not local and tls is None:
+        logger.warning(
+            "ANYBODY ON THE NETWORK TO %s CAN READ THE KEYS that are sent, and move the axes with them: "
+            "serve with --tls-certificate and --tls-key",
+            host,
+        )
+    door = Door({host, *host_names}, keys=keys or not local, proxy=keys and local, tls=tls)
     try:
-        asyncio.run(_serve(profile, data, listening, on_ready, {host, *host_names}, tls))
+        asyncio.run(_serve(profile, data, listening, door, on_ready))
     finally:
         listening.close()
 
@@ -114,9 +134,8 @@ async def _serve(
     profile: Profile,
     data: Path,
     listening: socket.socket,
+    door: Door,
     on_ready: Callable[[str], None] | None,
-    host_names: Collection[str],
-    tls: Tls | None,
 ) -> None:
     main = asyncio.current_task()
     assert main is not None
@@ -126,13 +145,13 @@ async def _serve(
         loop.add_signal_handler(number, main.cancel)
     try:
         async with (
-            running_service(profile, data) as service,
-            serving(service, listening, host_names, tls) as server,
+            running_service(profile, data, keys_asked=door.keys) as service,
+            serving(service, listening, door) as server,
         ):
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.add_signal_handler(number, server.handle_exit, number, None)
             if on_ready is not None:
-                on_ready(address_of(listening, tls))
+                on_ready(address_of(listening, door.tls))
             await server.exit_asked.wait()
     except asyncio.CancelledError:
         logger.info("ended before it was ready")
@@ -142,20 +161,19 @@ async def _serve(
 
 
 @contextlib.asynccontextmanager
-async def serving(
-    service: Service, listening: socket.socket, host_names: Collection[str] = (), tls: Tls | None = None
-) -> AsyncIterator[Server]:
+async def serving(service: Service, listening: socket.socket, door: Door = LOCAL) -> AsyncIterator[Server]:
     """Answer requests to `service` on a bound socket; on leaving, the axes are stopped before all else."""
     from daemon.api import create_app  # FastAPI takes its time to import, and a port in use needs none of it
 
     config = uvicorn.Config(
-        create_app(service, host_names),
+        create_app(service, door.host_names),
         lifespan="off",
         log_config=None,
         access_log=False,
         ws_max_size=LARGEST_MESSAGE,
-        ssl_certfile=None if tls is None else tls.certificate,
-        ssl_keyfile=None if tls is None else tls.key,
+        proxy_headers=door.proxy,
+        ssl_certfile=None if door.tls is None else door.tls.certificate,
+        ssl_keyfile=None if door.tls is None else door.tls.key,
     )
     server = Server(config, service)
     task = asyncio.create_task(server.serve(sockets=[listening]))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from calib import Calibration
 from calib.errors import CalibError
+from daemon.access.access import Access, running_access
 from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError
 from daemon.idempotency import AnswersGiven
@@ -32,8 +33,9 @@ logger = logging.getLogger(__name__)
 class Service:
     """One rig in operation. See `running_service`."""
 
-    def __init__(self, profile: Profile, rig: Rig, store: Store) -> None:
+    def __init__(self, profile: Profile, rig: Rig, store: Store, access: Access) -> None:
         self.profile = profile
+        self.access = access
         self.rig = rig
         self.store = store
         self.figures = Figures()
@@ -113,20 +115,22 @@ class Service:
 
 @contextlib.asynccontextmanager
 async def running_service(
-    profile: Profile, data: Path, devices: Devices | None = None
+    profile: Profile, data: Path, devices: Devices | None = None, *, keys_asked: bool = False
 ) -> AsyncIterator[Service]:
     """Open the rig of `profile` and what is stored in `data`; on leaving, the axes are stopped and let go.
 
-    `devices` are the profile's own unless given.
+    `devices` are the profile's own unless given; `keys_asked` is whether each request must show an API key.
 
-    Raises StoreError and OptionsError. A device that is not there is no error: it is looked for until it is.
+    Raises StoreError, NoKeyError and OptionsError. A device that is not there is no error: it is looked for until
+    it is.
     """
     async with contextlib.AsyncExitStack() as stack:
         store = await Store.open(data)
         stack.push_async_callback(store.close)
+        access = await stack.enter_async_context(running_access(store, keys_asked=keys_asked))
         rig = await Rig.open(profile, devices)
         stack.push_async_callback(rig.close)
-        service = Service(profile, rig, store)
+        service = Service(profile, rig, store, access)
         stack.push_async_callback(service.halt)
         pulse = asyncio.create_task(watch_loop(service.figures.loop_lag.observe), name="pulse")
         stack.callback(pulse.cancel)

@@ -8,6 +8,7 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from daemon.api import (
+    audit,
     axes,
     calibrations,
     camera,
@@ -19,12 +20,14 @@ from daemon.api import (
     reference,
     rig,
     runs,
+    session,
 )
+from daemon.api.gate import Gate
 from daemon.api.guard import Guard
 from daemon.api.observed import Observed
+from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
+from daemon.api.security import describe_roles
 from daemon.service import Service
-
-PREFIX: Final = "/api/v1"
 
 DESCRIPTION: Final = """
 Calibrates a camera on motorised axes with the camera itself, and says where the camera is.
@@ -33,6 +36,10 @@ Metres, radians, seconds and pixels, except for what concerns an axis as such: r
 jogs are in that axis's own reading unit. Times are RFC 3339 in UTC. A transform `target_from_source` takes
 points of the source frame to the target frame. Errors are RFC 9457 problem documents; go by their `code`,
 which is stable.
+
+Beyond the daemon's own machine each request shows an API key, as `Authorization: Bearer KEY`, whose role allows it
+(`x-role`): viewers read, operators move, stop, run and activate as well, admins also see who did. `GET /health`
+needs none.
 
 Whatever moves carries the token of the motion lease in the header `X-Lease`; `POST /stop` needs none.
 Whatever changes something is refused to a browser's page of another address (403, `foreign_page`), but for a
@@ -48,6 +55,8 @@ TAGS: Final = [
     {"name": "lease", "description": "Who may move."},
     {"name": "camera", "description": "The live picture."},
     {"name": "rig", "description": "What there is, and how it is."},
+    {"name": "session", "description": "Who asks, and browsers that have shown a key."},
+    {"name": "audit", "description": "Who did what."},
 ]
 
 
@@ -67,11 +76,12 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
     )
     app.state.service = service
     # Routes are tried in this order, so that the pose, which is asked most, comes first.
-    for part in (poses, pose_stream, rig, lease, axes, camera, runs, calibrations):
+    for part in (poses, pose_stream, rig, lease, axes, camera, runs, calibrations, session, audit):
         app.include_router(part.router, prefix=PREFIX)
     app.include_router(metrics.router)
     app.include_router(reference.router)
     problems.install(app)
+    app.add_middleware(Gate, service=service, rules=Rules(ROLES, ROLES_AT_ROOT))
     app.add_middleware(Guard, host_names=host_names)
     app.add_middleware(Observed, prefix=PREFIX)
     _describe_problems(app)
@@ -83,17 +93,19 @@ def _operation_id(route: APIRoute) -> str:
 
 
 def _describe_problems(app: FastAPI) -> None:
-    """Add the problem documents, which routes refer to by name, to the OpenAPI description."""
+    """Add the problem documents, which routes refer to by name, and the roles to the OpenAPI description."""
     describe = app.openapi
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
-            schemas = describe()["components"]["schemas"]
+            document = describe()
+            schemas = document["components"]["schemas"]
             for model in (problems.Problem, problems.InvalidField, problems.InvalidRequest):
                 reference = "#/components/schemas/{model}"
                 schema = model.model_json_schema(ref_template=reference)
                 schema.pop("$defs", None)
                 schemas[model.__name__] = schema
+            describe_roles(document)
         assert app.openapi_schema is not None
         return app.openapi_schema
 

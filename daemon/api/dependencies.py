@@ -4,6 +4,7 @@ from typing import Annotated
 
 from fastapi import Depends, Header, Request
 
+from daemon.access.access import Caller
 from daemon.lease import Lease
 from daemon.service import Service
 
@@ -14,6 +15,15 @@ def _service(request: Request) -> Service:
 
 
 ServiceDep = Annotated[Service, Depends(_service)]
+
+
+def _caller(request: Request) -> Caller | None:
+    caller: Caller | None = request.scope["caller"]
+    return caller
+
+
+CallerDep = Annotated[Caller | None, Depends(_caller)]
+"""Who asks; None only where the route needs no role."""
 
 LeaseToken = Annotated[
     str | None, Header(alias="X-Lease", description="The token of the motion lease, from POST /lease.")

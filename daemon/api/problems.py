@@ -70,6 +70,9 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
     daemon.IdempotencyUnknownError: Kind(
         409, "idempotency_unknown", "How the first request of this key ended is not known"
     ),
+    daemon.KeyRequiredError: Kind(401, "key_required", "A key is needed"),
+    daemon.KeyUnknownError: Kind(401, "key_unknown", "The key is not known"),
+    daemon.RoleRequiredError: Kind(403, "role_required", "The key's role does not allow this"),
     daemon.StoreError: Kind(503, "store_unavailable", "The database cannot be used"),
 }
 INVALID: Final = Kind(422, "invalid_request", "The request is not what this address takes")

@@ -41,6 +41,8 @@ def _page(api: dict[str, Any]) -> Iterator[str]:
 def _operation(method: str, path: str, operation: dict[str, Any]) -> Iterator[str]:
     yield f"<h3><code>{method.upper()} {escape(path)}</code></h3><p><b>{escape(operation['summary'])}.</b> "
     yield f"{escape(operation['description'])}</p><ul>"
+    if role := operation.get("x-role"):
+        yield f"<li>Role: {escape(role)}</li>"
     for parameter in operation.get("parameters", ()):
         text = parameter.get("description", "")
         yield f"<li><code>{escape(parameter['name'])}</code> ({parameter['in']}): {escape(text)}</li>"

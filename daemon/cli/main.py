@@ -9,10 +9,12 @@ import typer
 
 from calib.errors import CalibError, ReadingsError
 from daemon.cli import (
+    audit,
     backup,
     demo,
     detect,
     doctor,
+    key,
     pose,
     profile,
     serve,
@@ -56,9 +58,10 @@ def activecam(
     """Calibrate a camera on motorised axes with the camera itself, and serve its pose."""
 
 
-for command in (demo, serve, simulate, doctor, detect, solve, pose, verify, truth, target, backup):
+for command in (demo, serve, audit, simulate, doctor, detect, solve, pose, verify, truth, target, backup):
     command.register(app)
 app.add_typer(profile.app, name="profile")
+app.add_typer(key.app, name="key")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -28,6 +28,9 @@ def serve(
     host_name: Annotated[
         list[str] | None, typer.Option(help="A name under which clients may ask; may be given several times.")
     ] = None,
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Ask for a key on this machine too, as behind a proxy.")
+    ] = False,
     tls_certificate: Annotated[
         Path | None, typer.Option(help="Serve by HTTPS with this certificate (PEM).")
     ] = None,
@@ -45,4 +48,4 @@ def serve(
     def ready(address: str) -> None:
         output.print(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)", soft_wrap=True)
 
-    serve_rig(rig, data, host, port, ready, host_names=host_name or (), tls=tls)
+    serve_rig(rig, data, host, port, ready, host_names=host_name or (), keys=keys, tls=tls)

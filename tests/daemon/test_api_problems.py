@@ -27,6 +27,12 @@ INSIDE = {
     daemon.PoseError,
     daemon.IdempotencyError,
     daemon.TargetUnseenError,  # ends a run, whose `error` it becomes
+    daemon.BackupError,  # the command line alone makes backups
+    daemon.AccessError,
+    daemon.NoKeyError,  # as for ServeError
+    daemon.KeyNameError,  # keys are made on the command line alone
+    daemon.KeyExistsError,
+    daemon.UnknownKeyError,
     daemon.ServeError,  # there is nobody yet to answer
     daemon.PrintError,  # the command line alone prints
 }

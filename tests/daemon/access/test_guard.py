@@ -11,8 +11,9 @@ from websockets.exceptions import InvalidStatus
 
 from daemon.api import create_app
 from daemon.api.guard import LARGEST_BODY
-from daemon.server import LARGEST_MESSAGE, address_of, bind, serving
+from daemon.server import LARGEST_MESSAGE, Door, address_of, bind, serving
 from daemon.service import Service
+from tests.daemon.access.keys import close_code
 
 LOCAL = "http://localhost"
 
@@ -20,7 +21,7 @@ LOCAL = "http://localhost"
 @pytest.fixture
 async def address(service: Service) -> AsyncIterator[str]:
     listening = bind("127.0.0.1", 0)
-    async with serving(service, listening, ["rig.lab"]):
+    async with serving(service, listening, Door(["rig.lab"])):
         yield address_of(listening)
     listening.close()
 
@@ -111,8 +112,7 @@ async def test_a_stream_takes_no_large_messages(address: str) -> None:
     async with connect(f"{address.replace('http', 'ws')}/api/v1/pose/stream") as stream:
         await stream.recv()
         await stream.send("x" * (LARGEST_MESSAGE + 1))
-        await stream.wait_closed()
-    assert stream.close_code == 1009
+        assert await close_code(stream) == 1009
 
 
 @pytest.mark.parametrize(

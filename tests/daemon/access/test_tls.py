@@ -10,7 +10,7 @@ from websockets.asyncio.client import connect
 
 from daemon.cli import main
 from daemon.errors import ServeError
-from daemon.server import address_of, bind, serving
+from daemon.server import Door, address_of, bind, serving
 from daemon.service import Service
 from daemon.tls import Tls
 from tests.daemon.rigs import write_profile
@@ -37,7 +37,7 @@ async def test_it_is_served_by_https(service: Service, tmp_path: Path) -> None:
     with bind("127.0.0.1", 0) as listening:
         address = address_of(listening, tls)
         assert address.startswith("https://127.0.0.1:")
-        async with serving(service, listening, tls=tls):
+        async with serving(service, listening, Door(tls=tls)):
             async with httpx.AsyncClient(base_url=address, verify=trusting) as client:
                 assert (await client.get("/api/v1/health")).json()["status"] == "ok"
             stream = f"{address.replace('https', 'wss')}/api/v1/pose/stream"

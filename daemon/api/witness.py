@@ -1,0 +1,84 @@
+"""A request on its way to a route and its answer on the way back, as the audit log tells of them."""
+
+import asyncio
+import json
+from datetime import UTC, datetime
+from typing import Final
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from daemon.access.access import Caller
+from daemon.access.book import AuditBook
+from daemon.access.entries import AuditEntry
+
+KEPT: Final = 1000
+"""Bytes of a request's body that are written down; what moves an axis is less."""
+LONG: Final = 0.2
+"""Seconds after which a request that goes on, as a motion that is waited for, is written before it ends."""
+
+
+class Witness:
+    """Sees one request. Nobody waits for what is written of it."""
+
+    def __init__(self, book: AuditBook, caller: Caller, scope: Scope) -> None:
+        self._book = book
+        self._scope = scope
+        self._asked = bytearray()
+        self._answered = bytearray()
+        self._noted = False
+        self.entry = AuditEntry(
+            time=datetime.now(UTC),
+            who=None if caller.key is None else caller.key.name,
+            role=caller.role,
+            address=(scope.get("client") or ("",))[0],
+            method=scope["method"],
+            path=scope["path"],
+        )
+
+    async def follow(self, app: ASGIApp, receive: Receive, send: Send) -> None:
+        """Pass the request on to `app`; a route may take it out of the log by `leave_unwritten`."""
+
+        async def take() -> Message:
+            message = await receive()
+            if message["type"] == "http.request":
+                self._take(message)
+            return message
+
+        async def answer(message: Message) -> None:
+            self._answer(message)
+            await send(message)
+
+        beginning = asyncio.get_running_loop().call_later(LONG, self._note)
+        try:
+            await app(self._scope, take, answer)
+        except Exception:
+            self.entry.status = 500
+            raise
+        finally:
+            beginning.cancel()
+            if self._noted or not (self._scope.get(_UNWRITTEN) and self.entry.status == 200):
+                self._note()
+
+    def _note(self) -> None:
+        self._noted = True
+        self._book.note(self.entry)
+
+    def _take(self, message: Message) -> None:
+        self._asked += message.get("body", b"")[: KEPT - len(self._asked)]
+        self.entry.asked = self._asked.decode(errors="replace")
+
+    def _answer(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self.entry.status = message["status"]
+        elif self.entry.status is not None and self.entry.status >= 400:
+            self._answered += message.get("body", b"")
+            if not message.get("more_body", False):
+                self.entry.code = json.loads(self._answered)["code"]
+
+
+_UNWRITTEN: Final = "activecam.unwritten"
+
+
+def leave_unwritten(scope: Scope) -> None:
+    """Keep a request that succeeds out of the audit log: it only goes on with what is in it."""
+    scope[_UNWRITTEN] = True
