@@ -7,7 +7,7 @@ PEERS := .venv-peers
 PROFILE ?= paper-table
 DATA ?= activecam-data
 
-.PHONY: demo test test-kernel lint format serve bench bench-peers figures clean
+.PHONY: demo test test-kernel test-kill lint format serve bench bench-peers figures clean
 
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
@@ -18,6 +18,10 @@ test: $(VENV)/.installed-dev ## All tests but the slow suites
 test-kernel: $(VENV)/.installed-dev ## The drivers against real kernel devices, in a virtual machine that VMRUN (a command) runs its arguments in
 	@test -n "$(VMRUN)" || { echo "make test-kernel: say what runs a command in a virtual machine, VMRUN=..."; exit 2; }
 	$(VMRUN) --udev --timeout 1800 $(BIN)/python -m pytest -p no:cacheprovider tests/kernel
+
+test-kill: $(VENV)/.installed-dev ## Daemons killed at 200 random moments of runs, and disks that fill at 40: what was found each time
+	$(BIN)/python -m tests.daemon.kills 200
+	$(BIN)/python -m tests.daemon.full_disks 40
 
 lint: $(VENV)/.installed-dev ## Style, types, and who imports whom
 	$(BIN)/ruff check .
