@@ -25,7 +25,10 @@ STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.1)
 
 
 def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
-    """Find all inner corners; raises DetectionError where any is missing."""
+    """Find the inner corners, all of them roughly; raises DetectionError where that fails.
+
+    Corners that cannot be measured, as under a hand, are left out: the search only guesses them.
+    """
     candidates = (grid[:, ::-1] if is_mirrored(grid) else grid for grid in _found(picture.grey, target))
     boards = (_with_colours_in_place(picture.grey, grid) for grid in candidates)
     grid = next((board for board in boards if board is not None), None)
@@ -42,7 +45,11 @@ def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
         raise not_found
     corners = measure_corners(picture, view, points, rough, target.pitch, target.pitch / 2)
     reading = upright(target, corners.pixels)
-    return Detection(np.arange(len(points)), corners.pixels[reading], corners.covariances[reading], disk=None)
+    ids = np.flatnonzero(corners.found[reading])
+    there = reading[ids]
+    if view_of_plane(points[ids], corners.pixels[there]) is None:
+        raise not_found
+    return Detection(ids, corners.pixels[there], corners.covariances[there], disk=None)
 
 
 def _found(grey: NDArray[np.uint8], target: Chessboard) -> Iterator[NDArray[np.float64]]:
