@@ -12,10 +12,12 @@ import pytest
 from daemon.access.book import AuditBook
 from daemon.access.entries import AuditEntry
 from daemon.access.roles import Role
+from daemon.api import create_app
 from daemon.api.witness import KEPT
 from daemon.cli import main
 from daemon.errors import StoreError
-from daemon.service import Service
+from daemon.profile import Profile
+from daemon.service import Service, running_service
 from daemon.store import Store
 from daemon.store.audit import StoredAudit
 from daemon.store.database import Database
@@ -174,3 +176,14 @@ async def test_it_outlives_the_daemon_and_is_printed(
     assert '{"target": [bold]9' in first
     assert "invalid_request" in first
     assert "unknown" in second
+
+
+async def test_what_was_done_last_is_written_when_the_daemon_ends(profile: Profile, tmp_path: Path) -> None:
+    async with running_service(profile, tmp_path / "data") as service:
+        transport = httpx.ASGITransport(create_app(service))
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost/api/v1") as client:
+            await client.post("/stop/acknowledge")
+    store = await Store.open(tmp_path / "data")
+    [done] = await store.audit.read(None, 10)
+    assert (done.path, done.status) == ("/api/v1/stop/acknowledge", 200)
+    await store.close()

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -9,23 +10,16 @@ import httpx
 import pytest
 from websockets.asyncio.client import connect
 
-from daemon.access.keys import digest_of, make_key
+from daemon.access.key_ring import KeyRing
+from daemon.access.keys import ApiKey, digest_of, make_key
 from daemon.access.roles import Role
-from daemon.cli import main
-from daemon.errors import KeyNameError, NoKeyError
+from daemon.errors import KeyNameError, NoKeyError, StoreError
 from daemon.profile import Profile
 from daemon.server import serve
 from daemon.service import Service
 from daemon.store import Store
-from tests.daemon.access.keys import bearer, close_code
+from tests.daemon.access.keys import bearer, close_code, command
 from tests.daemon.snapshots import restore_snapshot
-
-
-def command(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    assert isinstance(ended.value.code, int)
-    return ended.value.code
 
 
 async def as_other_process(*arguments: object) -> int:
@@ -164,3 +158,39 @@ def test_a_daemon_that_nobody_could_use_is_not_started(
     with pytest.raises(NoKeyError):
         serve(profile, tmp_path / "data", port=0, keys=True)
     assert not caplog.text
+
+
+async def test_while_the_store_cannot_be_read_the_keys_stay_as_they_were(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("daemon.access.key_ring.REFRESHED", 0)
+    monkeypatch.setattr("daemon.access.key_ring.TOLD", 0)
+    store = await Store.open(tmp_path)
+    _, key = make_key("anna", Role.OPERATOR)
+    await store.keys.add(key)
+    ring, looks, told = KeyRing(store.keys), 0, asyncio.Event()
+    await ring.refresh()
+    read, tell = store.keys.all, store.keys.used
+
+    async def all_or_none() -> Sequence[ApiKey]:
+        nonlocal looks
+        looks += 1
+        if looks <= 3:
+            raise StoreError("disk I/O error")
+        return await read()
+
+    async def used(times: Mapping[str, datetime]) -> None:
+        assert ring.find(key.digest) == key
+        await tell(times)
+        told.set()
+
+    monkeypatch.setattr(store.keys, "all", all_or_none)
+    monkeypatch.setattr(store.keys, "used", used)
+    assert ring.find(key.digest) == key
+    following = asyncio.create_task(ring.follow())
+    await told.wait()
+    following.cancel()
+    assert looks >= 4
+    assert caplog.messages == ["keys that are added or removed now are not noticed: disk I/O error"]
+    assert (await read())[0].last_used_at is not None
+    await store.close()

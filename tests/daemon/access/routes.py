@@ -1,0 +1,65 @@
+"""Every route of the daemon, asked as anybody could ask it.
+
+`python -m tests.daemon.access.routes ADDRESS KEY` asks all of them, with the key and without one, and prints what each
+answered.
+"""
+
+import asyncio
+import json
+import sys
+from typing import Any
+
+import httpx
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
+
+from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT
+from tests.daemon.access.keys import bearer
+
+ALL = {f"{method} {PREFIX}{path}": role for name, role in ROLES.items() for method, path in [name.split()]}
+ALL |= ROLES_AT_ROOT
+
+BODIES: dict[str, dict[str, Any]] = {
+    "POST /api/v1/lease": {"owner": "eve"},
+    "POST /api/v1/axes/move": {"targets": {"pan": 1.0}},
+    "POST /api/v1/axes/{name}/move": {"target": 1.0},
+    "POST /api/v1/axes/{name}/jog": {"distance": 1.0},
+    "POST /api/v1/pose": {"readings": [[1.0, 2.0]]},
+    "POST /api/v1/project": {"points": [[0.0, 0.0, 0.0]]},
+    "POST /api/v1/rays": {"pixels": [[0.0, 0.0]]},
+}
+
+
+async def outcome(http: httpx.AsyncClient, route: str, headers: dict[str, str]) -> tuple[int, str | None]:
+    """Ask, and return the status and the problem's code, if there is one."""
+    method, path = route.split()
+    path = path.replace("{name}", "pan").replace("{run_id}", "none").replace("{calibration_id}", "none")
+    url = http.base_url.join(path)
+    if method == "WS":
+        try:
+            async with connect(str(url.copy_with(scheme="ws")), additional_headers=headers) as stream:
+                await stream.recv()
+        except InvalidStatus as refused:
+            return refused.response.status_code, json.loads(refused.response.body or b"")["code"]
+        return 101, None
+    async with http.stream(method, url, headers=headers, json=BODIES.get(route)) as answer:
+        if answer.headers.get("content-type") != "application/problem+json":
+            return answer.status_code, None
+        code = json.loads(await answer.aread())["code"]
+        if answer.status_code == 401 and code != "lease_required":
+            assert answer.headers["www-authenticate"] == "Bearer"
+        return answer.status_code, code
+
+
+async def ask_all(address: str, headers: dict[str, str]) -> dict[str, tuple[int, str | None]]:
+    async with httpx.AsyncClient(base_url=address, timeout=30) as http:
+        return {route: await outcome(http, route, headers) for route in ALL}
+
+
+async def main(address: str, key: str) -> None:
+    answers = [await ask_all(address, headers) for headers in (bearer(key), {})]
+    sys.stdout.write(json.dumps(answers))
+
+
+if __name__ == "__main__":
+    asyncio.run(main(*sys.argv[1:]))
