@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import ipaddress
 import logging
+import os
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable, Collection, Generator
@@ -15,7 +16,9 @@ from typing import Final
 import uvicorn
 
 from daemon.errors import ServeError
+from daemon.operation.supervisor import Supervisor
 from daemon.profile import Profile
+from daemon.rig import Rig
 from daemon.service import Service, running_service
 from daemon.tls import Tls
 
@@ -23,8 +26,10 @@ logger = logging.getLogger(__name__)
 
 DEFAULT_HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
-GRACE: Final = 1.0
+GRACE: Final = 0.5
 """Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""What ends the daemon, in order; a terminal that is closed sends the last."""
 LARGEST_MESSAGE: Final = 64 * 1024
 """Bytes of a WebSocket message from a client; none that there is to send has any."""
 
@@ -81,7 +86,7 @@ def serve(
     keys: bool = False,
     tls: Tls | None = None,
 ) -> None:
-    """Serve the rig of `profile` until SIGINT or SIGTERM, with what is stored in `data`.
+    """Serve the rig of `profile` until SIGINT, SIGTERM or SIGHUP, with what is stored in `data`.
 
     `on_ready` is called with the address (http://host:port) when requests are taken; port 0 takes a free one.
     `host_names` are names, beside `host`, under which clients may ask. Beyond this machine each request must show
@@ -140,24 +145,48 @@ async def _serve(
     main = asyncio.current_task()
     assert main is not None
     loop = asyncio.get_running_loop()
+    supervisor = Supervisor.of(os.environ)
+    supervisor.tell(STATUS="opening the devices")
     # Until the server takes them over, a signal ends the opening of the devices in an orderly way.
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         loop.add_signal_handler(number, main.cancel)
     try:
         async with (
             running_service(profile, data, keys_asked=door.keys) as service,
             serving(service, listening, door) as server,
         ):
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in SIGNALS:
                 loop.add_signal_handler(number, server.handle_exit, number, None)
             if on_ready is not None:
                 on_ready(address_of(listening, door.tls))
-            await server.exit_asked.wait()
+            supervisor.tell(
+                READY="1", STATUS=f"serving '{profile.name}' at {address_of(listening, door.tls)}"
+            )
+            try:
+                await _until_end(server, service.rig, supervisor)
+            finally:
+                supervisor.tell(STOPPING="1", STATUS="stopping the axes")
     except asyncio.CancelledError:
         logger.info("ended before it was ready")
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             loop.remove_signal_handler(number)
+
+
+async def _until_end(server: Server, rig: Rig, supervisor: Supervisor) -> None:
+    """Return when the end is asked for; raises what ended a task that must not end, after which nothing is sure."""
+    asked = asyncio.create_task(server.exit_asked.wait())
+    feeding = asyncio.create_task(supervisor.feed(lambda: rig.hung))
+    try:
+        ended, _ = await asyncio.wait([asked, *rig.tasks], return_when=asyncio.FIRST_COMPLETED)
+        for task in ended - {asked}:
+            logger.critical(
+                "'%s' has ended, which is an error in the program: the daemon ends", task.get_name()
+            )
+            task.result()
+    finally:
+        for task in (asked, feeding):
+            task.cancel()
 
 
 @contextlib.asynccontextmanager
@@ -182,9 +211,9 @@ async def serving(service: Service, listening: socket.socket, door: Door = LOCAL
         yield server
     finally:
         server.handle_exit(signal.SIGTERM, None)
-        # The axes must not go on moving while connections are drained.
+        drained = asyncio.create_task(asyncio.wait([task], timeout=GRACE))
         await service.halt()
-        await asyncio.wait([task], timeout=GRACE)
+        await drained
         server.hang_up()
         await task
 

@@ -12,6 +12,7 @@ from daemon.api import (
     axes,
     calibrations,
     camera,
+    health,
     lease,
     metrics,
     pose_stream,
@@ -76,7 +77,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
     )
     app.state.service = service
     # Routes are tried in this order, so that the pose, which is asked most, comes first.
-    for part in (poses, pose_stream, rig, lease, axes, camera, runs, calibrations, session, audit):
+    for part in (poses, pose_stream, health, rig, lease, axes, camera, runs, calibrations, session, audit):
         app.include_router(part.router, prefix=PREFIX)
     app.include_router(metrics.router)
     app.include_router(reference.router)

@@ -20,6 +20,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "POST /rays": VIEWER,
     "WS /pose/stream": VIEWER,
     "GET /health": None,
+    "GET /health/live": None,
+    "GET /health/ready": None,
     "GET /rig": VIEWER,
     "GET /profile": VIEWER,
     "GET /camera/frame.jpg": VIEWER,

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -14,6 +15,8 @@ from daemon.rig.wording import because
 from drivers.axis import Axis, AxisController, AxisSpec, AxisState
 from drivers.cancellation import finish
 from drivers.errors import AxisBusyError, DeviceLostError, DriverError, MotionStoppedError
+
+logger = logging.getLogger(__name__)
 
 POLL_PERIOD: Final = 0.02
 """Seconds of life between two readings of an axis."""
@@ -162,6 +165,7 @@ class ControllerOwner(DeviceOwner):
     async def _open(self) -> None:
         await self._controller.open()
         await self._poll()
+        await self._still()
 
     async def _serve(self) -> None:
         while True:
@@ -170,6 +174,18 @@ class ControllerOwner(DeviceOwner):
                 async with asyncio.timeout(POLL_PERIOD):
                     await self._wake.wait()
             self._wake.clear()
+            with self._at_work():
+                await self._poll()
+
+    async def _still(self) -> None:
+        """Stop what moves although nobody here has moved it: a daemon that was killed may have."""
+        moving = [
+            name for name, record in self._axes.items() if record.state is not None and record.state.moving
+        ]
+        for name in moving:
+            logger.warning("axis '%s' was found moving, and is stopped", name)
+        await asyncio.gather(*(self._controller.axes[name].stop() for name in moving))
+        if moving:
             await self._poll()
 
     async def _poll(self) -> None:

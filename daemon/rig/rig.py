@@ -81,6 +81,16 @@ class Rig:
         rig._publish()
         return rig
 
+    @property
+    def hung(self) -> list[str]:
+        """Sentences on drivers that do not come back from what they were asked to do."""
+        return [owner.hung for owner in (*self._controllers, self._camera) if owner.hung is not None]
+
+    @property
+    def tasks(self) -> "Sequence[asyncio.Task[None]]":
+        """What keeps the devices connected; none of them ends before `close`, unless by an error of the program."""
+        return tuple(self._tasks)
+
     async def close(self) -> None:
         """Stop all axes, wait until they stand, and let the devices go, even while being cancelled."""
         self.latch.engage("the daemon is shutting down")

@@ -40,6 +40,16 @@ class Store:
         """How often the database could not be used."""
         return self._database.errors
 
+    async def check_writable(self) -> None:
+        """Write, though nothing new, and have it on disk; raises StoreError where that cannot be done."""
+
+        def work(session: Session) -> None:
+            connection = session.connection()
+            version = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
+            connection.exec_driver_sql(f"PRAGMA user_version = {version}")
+
+        await self._database.transact(work)
+
     def session_folder(self, run: RunRecord) -> Path:
         """Return where the session of `run` is."""
         return self._database.folder / run.session

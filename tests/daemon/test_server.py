@@ -21,8 +21,13 @@ from websockets.exceptions import InvalidStatus
 
 from calib import load_session
 from daemon.errors import ServeError
-from daemon.server import address_of, bind, serving
-from daemon.service import Service
+from daemon.operation.supervisor import Supervisor
+from daemon.profile import Profile
+from daemon.rig import Devices
+from daemon.server import _until_end, address_of, bind, serving
+from daemon.service import Service, running_service
+from drivers.errors import MotionStoppedError
+from tests.daemon.motions import home_all, until
 from tests.daemon.rigs import write_profile
 
 DAEMON = """
@@ -198,6 +203,30 @@ async def test_clients_that_read_nothing_do_not_hold_up_the_end(
                 await service.rig.changed.wait()
     assert not service.streams.open
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+async def test_an_error_in_the_program_ends_it_with_axes_that_stand(
+    profile: Profile, devices: Devices, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("a fault of ours")
+
+    async with running_service(profile, tmp_path / "data", devices) as service:
+        rig = service.rig
+        await home_all(rig)
+        with bind("127.0.0.1", 0) as listening:
+            async with serving(service, listening) as server:
+                moving = asyncio.create_task(rig.move({"slide": 90.0}))
+                await until(rig, lambda snapshot: snapshot.moving)
+                monkeypatch.setattr(rig._controllers[0], "_publish", fail)
+                with pytest.raises(ZeroDivisionError):
+                    await _until_end(server, rig, Supervisor(None, None))
+        with pytest.raises((MotionStoppedError, asyncio.CancelledError, ZeroDivisionError)):
+            await moving
+    assert devices.world is not None
+    shaft, now = devices.world.shaft("slide")[1], devices.clock.now()
+    assert shaft.motor(now) != 90.0
+    assert not shaft.motion.velocity(now)
 
 
 async def test_answers_are_not_held_back() -> None:
