@@ -2,19 +2,18 @@
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic_core import to_json
 
 from calib import Calibration
 from daemon.errors import NotCalibratedError, StaleReadingError
 from daemon.pose.active import ActiveCalibration, Poses
-from daemon.pose.answers import fields, past_fields, written_list
+from daemon.pose.answers import fields, past_fields, written, written_list
 from daemon.rig import PastReadings, Rig, RigSnapshot
 from daemon.rig.utc import rfc3339
 from daemon.rig.wording import because
@@ -35,7 +34,7 @@ class PoseService:
         self._rig = rig
         self._given = given
         self._active: ActiveCalibration | None = None
-        self._written: dict[str | None, tuple[RigSnapshot, bytes]] = {}
+        self._latest: dict[str | None, tuple[RigSnapshot, bytes]] = {}
         """For each camera, the answer to the latest snapshot but for its age, which goes on changing."""
 
     @property
@@ -59,7 +58,7 @@ class PoseService:
     def activate(self, prepared: ActiveCalibration) -> None:
         """Answer from this calibration from now on."""
         self._active = prepared
-        self._written.clear()
+        self._latest.clear()
         logger.info("poses are computed from calibration '%s'", prepared.id)
 
     def now(self, camera: str | None = None) -> bytes:
@@ -70,12 +69,11 @@ class PoseService:
         active = self.active
         snapshot = self._rig.snapshot
         age = self._require_fresh(snapshot)
-        written = self._written.get(camera)
-        if written is None or written[0] is not snapshot:
-            written = snapshot, to_json(self._answer(active, snapshot, camera))[:-1]
-            self._written[camera] = written
-        self._given(1)
-        return b'%s,"age_s":%.6f}' % (written[1], age)
+        latest = self._latest.get(camera)
+        if latest is None or latest[0] is not snapshot:
+            latest = snapshot, written(self._answer(active, snapshot, camera))[:-1]
+            self._latest[camera] = latest
+        return b'%s,"age_s":%.6f}' % (latest[1], age)
 
     def readings_now(self) -> tuple[Array, Array]:
         """Return the latest readings (m,), and the sides they were approached from (m,); raises as `now` does."""
@@ -104,7 +102,7 @@ class PoseService:
         active, past = self.active, await self._rig.past_readings([time])
         (pose,) = past_fields(_poses_at(active, past, camera), past, [time])
         self._given(1)
-        return to_json(pose | _common(active, camera))
+        return written(pose | _common(active, camera))
 
     async def past_list(self, times: Sequence[datetime], camera: str | None = None) -> bytes:
         """Return the poses at past `times`, as the JSON of the API's `PosesAtTimes`; raises as `past` does."""
@@ -121,7 +119,7 @@ class PoseService:
 
     def _answer(
         self, active: ActiveCalibration, snapshot: RigSnapshot, camera: str | None
-    ) -> Mapping[str, Any]:
+    ) -> dict[str, Any]:
         readings = np.array([snapshot.readings], dtype=float)
         (pose,) = fields(active.poses(readings, camera, np.array([snapshot.approached])))
         assert snapshot.timestamp is not None
