@@ -32,7 +32,7 @@ class Connection(asyncio.Protocol):
 
     def __init__(self) -> None:
         self._transport: asyncio.Transport
-        self._received = b""
+        self._received = bytearray()
         self._request, self._left, self._sent_at = b"", 0, 0.0
         self._latencies: list[float] = []
         self._done: asyncio.Future[list[float]] | None = None
@@ -81,7 +81,8 @@ class Connection(asyncio.Protocol):
         if len(self._received) < whole:
             return
         self._latencies.append(time.perf_counter() - self._sent_at)
-        self.body, self._received = self._received[whole - length : whole], b""
+        self.body = bytes(self._received[whole - length : whole])
+        self._received.clear()
         self._left -= 1
         if self._left:
             self._send()

@@ -73,14 +73,14 @@ def run(*, quick: bool) -> dict[str, float]:
 async def _measure(address: str, loads: Sequence[Load]) -> list[Answers]:
     """Home the rig, make the constant one of its poses, and put each load on all endpoints in turns."""
     most = max(each.connections for each in loads)
-    daemon = await _connect(address, most)
+    daemon = await connect(address, most)
     try:
-        await _home(daemon[0])
+        await home(daemon[0])
         pose = await send(daemon[0], "GET", POSE)
         await send(daemon[0], "POST", CONSTANT, pose)
         say(f"Every answer has {len(pose)} bytes of body; each server is a process of its own.")
         with server_process("benchmarks.bare_server", str(len(pose))) as limit:
-            bare = await _connect(limit, most)
+            bare = await connect(limit, most)
             endpoints = [
                 Endpoint("GET /pose", daemon, request("GET", POSE)),
                 Endpoint("constant", daemon, request("GET", CONSTANT)),
@@ -93,7 +93,8 @@ async def _measure(address: str, loads: Sequence[Load]) -> list[Answers]:
         _close(daemon)
 
 
-async def _connect(address: str, count: int) -> list[Connection]:
+async def connect(address: str, count: int) -> list[Connection]:
+    """Return so many connections to a server."""
     where = urlsplit(address)
     assert where.hostname is not None
     assert where.port is not None
@@ -105,7 +106,8 @@ def _close(connections: Sequence[Connection]) -> None:
         connection.close()
 
 
-async def _home(connection: Connection) -> None:
+async def home(connection: Connection) -> None:
+    """Home all axes of the rig."""
     lease = json.loads(await send(connection, "POST", "/api/v1/lease", b'{"owner": "benchmark"}'))
     shown = [f"X-Lease: {lease['token']}"]
     rig = json.loads(await send(connection, "GET", "/api/v1/rig"))

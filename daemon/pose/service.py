@@ -117,9 +117,7 @@ class PoseService:
 
         return await asyncio.to_thread(write)
 
-    def _answer(
-        self, active: ActiveCalibration, snapshot: RigSnapshot, camera: str | None
-    ) -> dict[str, Any]:
+    def _answer(self, active: ActiveCalibration, snapshot: RigSnapshot, camera: str | None) -> dict[str, Any]:
         readings = np.array([snapshot.readings], dtype=float)
         (pose,) = fields(active.poses(readings, camera, np.array([snapshot.approached])))
         assert snapshot.timestamp is not None

@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -17,7 +16,7 @@ from pydantic import BaseModel
 from daemon.api import create_app, pose_stream, problems
 from daemon.procedure import RunEvent
 from daemon.service import Service, running_service
-from tests.daemon.rigs import small_rig, write_profile
+from tests.daemon.rigs import small_rig
 from tests.docs.pages import blocks, page, table_below, unquoted
 
 PAGE = "reference/api.md"
@@ -120,25 +119,6 @@ def test_an_answer_on_the_page_has_the_form_that_it_has(model: str, text: str) -
     answer = json.loads(text)
     jsonschema.validate(answer, {"$ref": f"#/components/schemas/{model}", "components": {"schemas": schemas}})
     assert set(answer) == set(schemas[model]["properties"])
-
-
-@pytest.fixture
-def served(tmp_path: Path) -> Iterator[str]:
-    """The address of a daemon of its own, on a small rig whose axes are called as those on the page."""
-    command = [sys.executable, "-c", "from daemon.cli import main; main()", "serve", "--port", "0"]
-    command += ["--profile", str(write_profile(tmp_path)), "--data", str(tmp_path / "data")]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
-    ) as process:
-        assert process.stdout is not None
-        try:
-            found = re.search(r"http://[\w.:]+", process.stdout.readline())
-            assert found is not None
-            yield found[0]
-        finally:
-            process.terminate()
-            process.communicate()
-    assert process.returncode == 0
 
 
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
