@@ -1,7 +1,6 @@
 """The app: every route under /api/v1, described for OpenAPI, with problems for errors."""
 
 from collections.abc import Collection
-from importlib.metadata import version
 from typing import Any, Final
 
 from fastapi import FastAPI
@@ -29,6 +28,9 @@ from daemon.api.observed import Observed
 from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
 from daemon.service import Service
+
+API_VERSION: Final = "1.0.0"
+"""Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
 Calibrates a camera on motorised axes with the camera itself, and says where the camera is.
@@ -65,7 +67,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
     """Return the ASGI app of `service`, which its caller opens and closes; `host_names` as for the `Guard`."""
     app = FastAPI(
         title="activecam",
-        version=version("activecam"),
+        version=API_VERSION,
         summary="Where is the camera?",
         description=DESCRIPTION,
         openapi_url=f"{PREFIX}/openapi.json",
