@@ -43,6 +43,8 @@ LATE = 0.05
 class Told:
     """What a daemon has told until it was killed."""
 
+    up: bool = False
+    """Whether it had started."""
     unfinished: list[str] = field(default_factory=list)
     """The runs that it found unfinished when it started, by what it logged."""
     calibration: str | None = None
@@ -104,7 +106,7 @@ def kill_one(folder: Path, data: Path, asked: Asked, moment: int, late: float) -
     process.start()
     there.close()
     told = Told()
-    while len(told.events) < moment and _hear(here, told):
+    while not (told.up and len(told.events) >= moment) and _hear(here, told):
         pass
     time.sleep(late)
     process.kill()
@@ -124,7 +126,7 @@ def _hear(pipe: Connection, told: Told) -> bool:
     if kind == "log" and "was interrupted" in what:
         told.unfinished.append(what.split("'")[1])
     elif kind == "up":
-        told.calibration = what
+        told.up, told.calibration = True, what
     elif kind == "run":
         told.run = what
     elif kind == "event":
@@ -150,6 +152,7 @@ class Kills:
         asked = Asked(action, run_id, 0 if run_id is None else len(self._events(run_id)))
         moment, late = self._random.randrange(EVENTS[action]), self._random.uniform(0, LATE)
         told = kill_one(self._folder, self._data, asked, moment, late)
+        assert told.up
         self._check_start(told)
         views = "none" if told.run is None else self._check_disk(told)
         self._note(told)
