@@ -12,7 +12,7 @@ from calib import Calibration
 from calib.errors import CalibError
 from daemon.access.access import Access, running_access
 from daemon.client_motion import ClientMotions
-from daemon.errors import DaemonError
+from daemon.errors import DaemonError, StoreError
 from daemon.idempotency import AnswersGiven
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
@@ -67,8 +67,11 @@ class Service:
     async def restore(self) -> None:
         """Take up what an earlier daemon left: the active calibration, and runs that it did not finish."""
         await self.answers.restore()
-        for run in await self.store.interrupt_unfinished():
-            logger.warning("run '%s' was interrupted: %s", run.id, run.error)
+        try:
+            await self.runs.settle()
+        except StoreError as error:
+            # A full disk is no reason to serve no pose; it is done before the next run.
+            logger.warning("runs that an earlier daemon left unfinished are not marked so: %s", error)
         self.fallback = await self._take_up_calibration()
         if self.fallback is not None:
             logger.warning("%s", self.fallback.sentence)

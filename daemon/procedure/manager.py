@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import logging
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import replace
@@ -18,6 +19,8 @@ from daemon.procedure.run import Run
 from daemon.profile_document import ProfileDocument
 from daemon.rig import Rig
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
+
+logger = logging.getLogger(__name__)
 
 Activate = Callable[[CalibrationRecord, Calibration], None]
 
@@ -56,6 +59,7 @@ class RunManager:
         """
         async with self._starting:
             self._require_able()
+            await self.settle()
             record = self._new_record(owner, note)
             folder = self._store.session_folder(record)
 
@@ -76,6 +80,8 @@ class RunManager:
             self.active.resume()
             return self.active.record
         async with self._starting:
+            if self.active is None:
+                await self.settle()
             before = await self._require_unfinished(run_id)
             self._require_able()
             self._require_same_profile(before)
@@ -88,10 +94,19 @@ class RunManager:
         Raises UnknownRunError, RunActiveError, RunStateError and StoreError.
         """
         async with self._starting:
+            if self.active is None:
+                await self.settle()
             before = await self._require_unfinished(run_id)
             self._require_free()
             assignment = Solve(before, self._store.session_folder(before))
             return await self._begin(before, assignment, lambda: self._take_up(before))
+
+    async def settle(self) -> None:
+        """Store how earlier runs have ended that the store takes for unfinished, while none is; raises StoreError."""
+        if self._latest is not None:
+            await self._latest.store_end()
+        for run in await self._store.interrupt_unfinished():
+            logger.warning("run '%s' was interrupted: %s", run.id, run.error)
 
     def pause(self, run_id: str) -> None:
         """Let a run come to rest after the view in flight; raises RunStateError."""
@@ -155,8 +170,6 @@ class RunManager:
         token: str | None = None,
     ) -> RunRecord:
         """Start a run, under a lease of its own where it moves, once `take_up` has stored that it is under way."""
-        if self._latest is not None:
-            await self._latest.store_end()
         lease = self._leases.hand_over(f"run {record.id}", record.note, token) if assignment.moves else None
         try:
             log = await take_up()

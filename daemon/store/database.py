@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import shutil
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,6 +22,9 @@ logger = logging.getLogger(__name__)
 
 DATABASE: Final = "activecam.db"
 """Its name in the data folder."""
+
+SHARED_MEMORY: Final = 32768
+"""Bytes of the file through which those who use the database at the same time know of each other."""
 
 Result = TypeVar("Result")
 
@@ -75,9 +79,17 @@ class Database:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
         except SQLAlchemyError as error:
             self.errors += 1
-            raise StoreError(f"{self.path}: the database cannot be used: {_reason_of(error)}") from error
+            raise StoreError(f"{self.path}: the database cannot be used: {self._reason_of(error)}") from error
         except ValueError as error:
             raise StoreError(f"{self.path}: a record in the database is damaged: {error}") from error
+
+    def _reason_of(self, error: SQLAlchemyError) -> str:
+        """Return what SQLite said, without the statement that it said it of; of a full disk, what to do about it."""
+        reason = str(getattr(error, "orig", None) or error).splitlines()[0]
+        full = reason == "database or disk is full"
+        if reason == "disk I/O error":  # as SQLite says, too, where there is no room for its shared memory
+            full = shutil.disk_usage(self.folder).free < SHARED_MEMORY
+        return "the disk is full: make room" if full else reason
 
     def _open(self) -> None:
         self._lock = lock_folder(self.folder)
@@ -132,7 +144,8 @@ class Database:
         except SQLAlchemyError as error:
             raise StoreError(
                 f"{self.path}: of schema {version}, and could not be brought to schema {schema_version()} "
-                f"({_reason_of(error)}): it is as it was, so go on with the activecam that wrote it, and report this"
+                f"({self._reason_of(error)}): it is as it was, so go on with the activecam that wrote it, "
+                "and report this"
             ) from error
         logger.warning(
             "%s was of schema %d and is now of schema %d: %s is how it was",
@@ -146,12 +159,6 @@ class Database:
         if self._engine is not None:
             self._engine.dispose()
         self._let_go()
-
-
-def _reason_of(error: SQLAlchemyError) -> str:
-    """Return what SQLite said, and what to do about a full disk, without the statement that it said it of."""
-    reason = str(getattr(error, "orig", None) or error).splitlines()[0]
-    return "the disk is full: make room" if reason == "database or disk is full" else reason
 
 
 def _make_durable(connection: Any, _record: Any) -> None:

@@ -183,6 +183,33 @@ def test_all_frames_of_a_view_are_on_disk_and_a_lost_one_is_named(tmp_path: Path
         observe(load_session(tmp_path), only=[1])
 
 
+def test_a_session_goes_on_after_its_last_finished_sweep_and_keeps_all_pictures(tmp_path: Path) -> None:
+    def add(writer: SessionWriter, grey: int, reading: float) -> View:
+        fields = {"joint": "slide", "readings": [reading, 0.0], "sweep": writer.session.sweeps_done}
+        return writer.add_pictures([np.full((4, 4), grey, np.uint8)], **fields)
+
+    cut_off = Session.model_validate(document(views=[], complete=False))
+    writer = SessionWriter(tmp_path, cut_off)
+    done = add(writer, 1, 0.0)
+    writer.end_sweep()
+    lost = [add(writer, 2, 10.0), add(writer, 3, 20.0)]
+    for _ in range(2):  # cut off again before anything was taken
+        writer = SessionWriter.resume(tmp_path)
+        assert writer.session.views == [done]
+        assert writer.session.set_aside == lost
+    again = add(writer, 4, 10.0)
+    assert load_session(tmp_path).views == [done, again]
+    greys = [cv2.imread(str(tmp_path / str(v.image)), cv2.IMREAD_GRAYSCALE) for v in (done, *lost, again)]
+    assert [int(grey[0, 0]) for grey in greys if grey is not None] == [1, 2, 3, 4]
+
+    writer.complete()
+    assert SessionWriter.resume(tmp_path).session == writer.session
+    SessionWriter(tmp_path, cut_off.with_views([done]).model_copy(update={"sweeps_done": 1}))
+    (tmp_path / str(done.image)).unlink()
+    with pytest.raises(ImageError, match=r"0000\.png: the picture of a view is gone: start a new run"):
+        SessionWriter.resume(tmp_path)
+
+
 def test_a_view_that_cannot_be_written_leaves_the_session_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

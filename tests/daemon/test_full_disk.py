@@ -2,6 +2,7 @@
 
 import contextlib
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,12 @@ from calib import load_session
 from daemon.errors import StoreError
 from daemon.procedure.event_file import EventFile
 from daemon.procedure.event_log import read_events
-from daemon.service import Service
-from daemon.store import RunState
+from daemon.profile import Profile
+from daemon.service import Service, running_service
+from daemon.store import RunRecord, RunState, Store
 from tests.daemon.full_disks import in_namespace
 from tests.daemon.runs import finish, of
+from tests.daemon.snapshots import restore_snapshot
 
 FULL = Path("/dev/full")
 """Takes no byte, in the words of a full disk."""
@@ -95,6 +98,34 @@ async def test_an_end_that_the_store_did_not_take_is_stored_before_the_next_run(
     assert (await service.store.run(run.id)).error == cancelled.error
     assert (await service.store.run(run.id)).state is RunState.CANCELLED
     await service.runs.cancel(second.id)
+
+
+async def test_a_daemon_that_starts_on_a_full_disk_serves_the_pose(
+    profile: Profile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def full(_: object) -> None:
+        raise StoreError("the disk is full: make room")
+
+    restore_snapshot(1, tmp_path)
+    (unfinished,) = (run for run in await _runs(tmp_path) if not run.state.over)
+    room = Store.interrupt_unfinished
+    monkeypatch.setattr(Store, "interrupt_unfinished", full)
+    async with running_service(profile, tmp_path) as service:
+        assert service.poses.calibration_id is not None
+        assert "are not marked so: the disk is full: make room" in caplog.text
+        with pytest.raises(StoreError):
+            await service.runs.start()
+        monkeypatch.setattr(Store, "interrupt_unfinished", room)
+        await service.runs.cancel((await service.runs.start()).id)
+        assert (await service.runs.get(unfinished.id)).state is RunState.INTERRUPTED
+
+
+async def _runs(data: Path) -> Sequence[RunRecord]:
+    store = await Store.open(data)
+    try:
+        return await store.runs()
+    finally:
+        await store.close()
 
 
 @pytest.fixture
