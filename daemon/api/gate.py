@@ -10,7 +10,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from daemon.access.access import Caller
 from daemon.api.problems import HTTP_PROBLEMS, kind_of, respond
 from daemon.api.rules import Rule, Rules
-from daemon.api.witness import Witness
+from daemon.api.witness import Witness, path_sent
 from daemon.errors import AccessError, KeyRequiredError, RoleRequiredError
 from daemon.service import Service
 
@@ -107,6 +107,6 @@ def _refused(scope: Scope, error: AccessError) -> Response:
     kind = kind_of(error)
     if not isinstance(error, KeyRequiredError):
         address = (scope.get("client") or ("somewhere",))[0]
-        logger.warning("%s was refused to %s: %s", scope["path"], address, error)
+        logger.warning("%s was refused to %s: %s", path_sent(scope), address, error)
     headers = {"WWW-Authenticate": "Bearer"} if kind.status == 401 else None
     return respond(HTTPConnection(scope), kind, str(error), headers)

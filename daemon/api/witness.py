@@ -10,6 +10,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from daemon.access.access import Caller
 from daemon.access.book import AuditBook
 from daemon.access.entries import AuditEntry
+from daemon.operation.log_fields import log_fields
 
 KEPT: Final = 1000
 """Bytes of a request's body that are written down; what moves an axis is less."""
@@ -32,7 +33,7 @@ class Witness:
             role=caller.role,
             address=(scope.get("client") or ("",))[0],
             method=scope["method"],
-            path=scope["path"],
+            path=path_sent(scope),
         )
 
     async def follow(self, app: ASGIApp, receive: Receive, send: Send) -> None:
@@ -49,8 +50,10 @@ class Witness:
             await send(message)
 
         beginning = asyncio.get_running_loop().call_later(LONG, self._note)
+        who = {} if self.entry.who is None else {"who": self.entry.who}
         try:
-            await app(self._scope, take, answer)
+            with log_fields(**who):
+                await app(self._scope, take, answer)
         except Exception:
             self.entry.status = 500
             raise
@@ -74,6 +77,12 @@ class Witness:
             self._answered += message.get("body", b"")
             if not message.get("more_body", False):
                 self.entry.code = json.loads(self._answered)["code"]
+
+
+def path_sent(scope: Scope) -> str:
+    """Return the path as it was sent, in which nothing passes for the end of a line."""
+    raw: bytes = scope["raw_path"]
+    return raw.decode("ascii", "backslashreplace")
 
 
 _UNWRITTEN: Final = "activecam.unwritten"

@@ -44,13 +44,20 @@ def audit(
             entry.asked,
             _outcome(entry),
         )
-        table.add_row(*(Text(cell) for cell in cells))
+        table.add_row(*(Text(_printable(cell)) for cell in cells))
     output.print(table)
 
 
 def _document(entry: AuditEntry) -> dict[str, object]:
     fields = {name: getattr(entry, name) for name in AuditEntry.__dataclass_fields__}
     return fields | {"time": entry.time.isoformat()}
+
+
+def _printable(text: str) -> str:
+    """Return a text that a terminal takes for nothing but a text."""
+    return "".join(
+        character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in text
+    )
 
 
 def _outcome(entry: AuditEntry) -> str:

@@ -13,8 +13,8 @@ import httpx
 import pytest
 
 from daemon.access.roles import Role
-from tests.daemon.access.keys import bearer, command
-from tests.daemon.access.routes import ALL
+from tests.daemon.access.commands import ALL, command
+from tests.daemon.access.keys import bearer
 from tests.daemon.rigs import write_profile
 from tests.daemon.snapshots import restore_snapshot
 
@@ -71,7 +71,12 @@ def served(tmp_path: Path, other: tuple[str, str], keys: dict[Role, str]) -> Ite
         "--port",
         "0",
     ]
-    serve += ["--profile", str(write_profile(tmp_path)), "--data", str(tmp_path / "data")]
+    serve += [
+        "--profile",
+        str(write_profile(tmp_path, max_reading_age="1000 s")),
+        "--data",
+        str(tmp_path / "data"),
+    ]
     with subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
@@ -88,7 +93,7 @@ def served(tmp_path: Path, other: tuple[str, str], keys: dict[Role, str]) -> Ite
 def test_a_viewer_elsewhere_reads_the_pose_and_does_nothing_else(
     served: str, other: tuple[str, str], keys: dict[Role, str]
 ) -> None:
-    elsewhere = ["ip", "netns", "exec", other[0], sys.executable, "-m", "tests.daemon.access.routes"]
+    elsewhere = ["ip", "netns", "exec", other[0], sys.executable, "-m", "tests.daemon.access.asking"]
     with httpx.Client(base_url=f"{served}/api/v1", headers=bearer(keys[Role.ADMIN]), timeout=30) as chief:
         lease = {"X-Lease": chief.post("/lease", json={"owner": "chief"}).json()["token"]}
         for axis in ("slide", "pan"):
@@ -96,7 +101,7 @@ def test_a_viewer_elsewhere_reads_the_pose_and_does_nothing_else(
         assert chief.delete("/lease", headers=lease).status_code == 204
         before = [chief.get(path).json() for path in ("/audit", "/runs", "/calibrations/current", "/pose")]
 
-        answers, strangers = json.loads(run(*elsewhere, served, keys[Role.VIEWER]))
+        answers, strangers = json.loads(run(*elsewhere, served, keys[Role.VIEWER], *ALL))
         assert answers["GET /api/v1/pose"] == [200, None]
         assert answers["WS /api/v1/pose/stream"] == [101, None]
         refused = {route for route, (_, code) in answers.items() if code == "role_required"}

@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import logging
+import re
 from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,6 +18,7 @@ from daemon.api import create_app
 from daemon.api.witness import KEPT
 from daemon.cli import main
 from daemon.errors import StoreError
+from daemon.operation.log_format import TextLines
 from daemon.profile import Profile
 from daemon.service import Service, running_service
 from daemon.store import Store
@@ -67,6 +70,15 @@ async def test_it_says_who_did_what_and_what_came_of_it(
     page = (await http.get("/audit", params={"limit": 2, "before": done[3]["id"]}, headers=admin)).json()
     assert page == [done[2], done[1]]
     assert (await http.get("/audit?limit=0", headers=admin)).status_code == 422
+
+
+async def test_the_log_says_who_too(
+    http: httpx.AsyncClient, secrets: dict[Role, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.handler.setFormatter(TextLines())
+    with caplog.at_level(logging.INFO):
+        await http.post("/lease", json={"owner": "anna"}, headers=bearer(secrets[Role.OPERATOR]))
+    assert re.search(r"'anna' may move .* \[request=\w+ who=operator\]", caplog.text)
 
 
 async def test_a_renewal_that_fails_is_written(client: httpx.AsyncClient, service: Service) -> None:
@@ -167,13 +179,13 @@ async def test_it_outlives_the_daemon_and_is_printed(
 ) -> None:
     store = await Store.open(tmp_path)
     done = entry("/api/v1/axes/pan/move")
-    done.asked, done.status, done.code = '{"target": [bold]9', 422, "invalid_request"
+    done.asked, done.status, done.code = '{"target": [bold]9\x1b[2J', 422, "invalid_request"
     await store.audit.write([done, entry("/api/v1/stop")])
     with pytest.raises(SystemExit):  # beside the daemon, which has the folder
         await asyncio.to_thread(main, ["audit", "--data", str(tmp_path)])
     await store.close()
     first, second = [line for line in capsys.readouterr().out.splitlines() if "192.0.2.7" in line]
-    assert '{"target": [bold]9' in first
+    assert '{"target": [bold]9\N{REPLACEMENT CHARACTER}[2J' in first
     assert "invalid_request" in first
     assert "unknown" in second
 

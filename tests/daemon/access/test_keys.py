@@ -18,7 +18,8 @@ from daemon.profile import Profile
 from daemon.server import serve
 from daemon.service import Service
 from daemon.store import Store
-from tests.daemon.access.keys import bearer, close_code, command
+from tests.daemon.access.commands import command
+from tests.daemon.access.keys import bearer, close_code
 from tests.daemon.snapshots import restore_snapshot
 
 

@@ -1,6 +1,6 @@
-"""Every route of the daemon, asked as anybody could ask it.
+"""Routes asked as anybody could ask them, who has nothing of the daemon's.
 
-`python -m tests.daemon.access.routes ADDRESS KEY` asks all of them, with the key and without one, and prints what each
+`python -m tests.daemon.access.asking ADDRESS KEY ROUTE...` asks each, with the key and without one, and prints what was
 answered.
 """
 
@@ -13,11 +13,7 @@ import httpx
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 
-from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT
 from tests.daemon.access.keys import bearer
-
-ALL = {f"{method} {PREFIX}{path}": role for name, role in ROLES.items() for method, path in [name.split()]}
-ALL |= ROLES_AT_ROOT
 
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/lease": {"owner": "eve"},
@@ -51,13 +47,11 @@ async def outcome(http: httpx.AsyncClient, route: str, headers: dict[str, str]) 
         return answer.status_code, code
 
 
-async def ask_all(address: str, headers: dict[str, str]) -> dict[str, tuple[int, str | None]]:
+async def main(address: str, key: str, *routes: str) -> None:
     async with httpx.AsyncClient(base_url=address, timeout=30) as http:
-        return {route: await outcome(http, route, headers) for route in ALL}
-
-
-async def main(address: str, key: str) -> None:
-    answers = [await ask_all(address, headers) for headers in (bearer(key), {})]
+        answers = [
+            {route: await outcome(http, route, headers) for route in routes} for headers in (bearer(key), {})
+        ]
     sys.stdout.write(json.dumps(answers))
 
 
