@@ -2,7 +2,7 @@
 
 In the order in which a run goes:
 
-    manager       one run at a time, under its own lease
+    manager       one run at a time, under its own lease;  beginning  what is kept of it from then on
     run           its states, from its start to its last word;  gate  where it waits while paused
     assignment    what it has to do: measure and solve, or solve what there is
     survey        homing, sweeps and free views;  observation  one view

@@ -2,21 +2,18 @@
 
 import asyncio
 import contextlib
-import json
 import logging
-import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 
 from calib import Calibration
-from daemon.errors import ProfileChangedError, RigFaultError, RunActiveError, RunStateError, StoreError
+from daemon.errors import RigFaultError, RunActiveError, RunStateError, StoreError
 from daemon.lease import Lease, LeaseDesk
 from daemon.procedure.assignment import Assignment, Calibrate, Solve
+from daemon.procedure.beginning import new_record, require_same_profile
 from daemon.procedure.event_log import EventLog, Told, past_events
 from daemon.procedure.events import RunEvent
 from daemon.procedure.run import Run
-from daemon.profile_document import ProfileDocument
 from daemon.rig import Rig
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
 
@@ -58,9 +55,9 @@ class RunManager:
         LeaseHeldError and StoreError.
         """
         async with self._starting:
-            self._require_able()
             await self.settle()
-            record = self._new_record(owner, note)
+            self._require_able()
+            record = new_record(self._rig.profile, owner, note)
             folder = self._store.session_folder(record)
 
             async def take_up() -> EventLog:
@@ -80,11 +77,10 @@ class RunManager:
             self.active.resume()
             return self.active.record
         async with self._starting:
-            if self.active is None:
-                await self.settle()
+            await self.settle()
             before = await self._require_unfinished(run_id)
             self._require_able()
-            self._require_same_profile(before)
+            require_same_profile(before, self._rig.profile)
             assignment = Calibrate(self._rig, self._store.session_folder(before))
             return await self._begin(before, assignment, lambda: self._take_up(before), token)
 
@@ -94,15 +90,16 @@ class RunManager:
         Raises UnknownRunError, RunActiveError, RunStateError and StoreError.
         """
         async with self._starting:
-            if self.active is None:
-                await self.settle()
+            await self.settle()
             before = await self._require_unfinished(run_id)
             self._require_free()
             assignment = Solve(before, self._store.session_folder(before))
             return await self._begin(before, assignment, lambda: self._take_up(before))
 
     async def settle(self) -> None:
-        """Store how earlier runs have ended that the store takes for unfinished, while none is; raises StoreError."""
+        """Store how runs have ended that the store takes for unfinished, unless one is under way; raises StoreError."""
+        if self.active is not None:
+            return
         if self._latest is not None:
             await self._latest.store_end()
         for run in await self._store.interrupt_unfinished():
@@ -221,37 +218,11 @@ class RunManager:
             raise RunStateError(f"run '{run_id}' has succeeded: start another")
         return record
 
-    def _require_same_profile(self, record: RunRecord) -> None:
-        then = json.loads(record.profile)
-        now = ProfileDocument.of(self._rig.profile).model_dump(mode="json")
-        changed = [key for key, value in now.items() if then.get(key) != value]
-        if changed:
-            raise ProfileChangedError(
-                f"run '{record.id}' was taken with another profile ({', '.join(changed)}): "
-                "serve that one to resume it, or start another run"
-            )
-
     def _require_active(self, run_id: str) -> Run:
         run = self.active
         if run is None or run.record.id != run_id:
             raise RunStateError(f"run '{run_id}' is not under way")
         return run
-
-    def _new_record(self, owner: str, note: str) -> RunRecord:
-        now = datetime.now(UTC)
-        run_id = f"{now:%Y%m%d-%H%M%S}-{secrets.token_hex(3)}"
-        profile = self._rig.profile
-        return RunRecord(
-            id=run_id,
-            state=RunState.RUNNING,
-            profile_name=profile.name,
-            profile=ProfileDocument.of(profile).model_dump_json(),
-            session=f"sessions/{run_id}",
-            owner=owner,
-            note=note,
-            created_at=now,
-            started_at=now,
-        )
 
     def _end_of(self, lease: Lease | None) -> Callable[[CalibrationRecord | None, Calibration | None], None]:
         def end(record: CalibrationRecord | None, calibration: Calibration | None) -> None:

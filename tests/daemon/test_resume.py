@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
@@ -22,6 +23,7 @@ from daemon.errors import (
     StopLatchedError,
     UnknownRunError,
 )
+from daemon.procedure.beginning import new_record, require_same_profile
 from daemon.procedure.event_log import read_events
 from daemon.procedure.observation import Observation, Taken, find
 from daemon.profile import Profile
@@ -119,6 +121,16 @@ async def test_another_profile_is_no_way_to_go_on(profile: Profile, tmp_path: Pa
             await service.runs.resume(run.id)
         assert await service.runs.get(run.id) == run
         assert service.leases.current is None
+
+
+def test_what_a_later_activecam_knows_besides_is_no_other_profile(profile: Profile) -> None:
+    record = new_record(profile, "", "")
+    then = json.loads(record.profile)
+    del then["procedure"]["frames"], then["axes"][1]["reading_std"]
+    require_same_profile(replace(record, profile=json.dumps(then)), profile)
+    then["axes"].pop()
+    with pytest.raises(ProfileChangedError, match=r"\(axes\)"):
+        require_same_profile(replace(record, profile=json.dumps(then)), profile)
 
 
 async def test_what_stands_against_a_new_run_stands_against_going_on(service: Service) -> None:
