@@ -18,6 +18,7 @@ NAMES: Final = (
     "live_rate",
     "pose_rate",
     "stop_time",
+    "start_time",
     "efficiency",
     "uncertainty",
     "pictures",

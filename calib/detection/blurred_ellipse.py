@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 Values = NDArray[np.float32]
@@ -166,6 +165,8 @@ def _near_edges(ellipses: Ellipses, edges: Samples) -> Values:
 
     All are (n, 11, m).
     """
+    from scipy.special import ndtr  # heavy to import, and a daemon that serves poses measures no disks
+
     (vx, vy), (nx, ny), radius, steepness, depth = _seen(ellipses, edges.x, edges.y)
     rows = np.empty((len(vx), PARAMETERS + 1, vx.shape[1]), np.float32)
     jacobian = rows[:, :-1]

@@ -8,9 +8,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from calib.detection.detection import Detection
 from calib.detection.disks import Disks, disk_centroids
@@ -95,6 +92,11 @@ def _neighbourhoods(blobs: _Blobs, target: AnyCircleGrid) -> Iterator[NDArray[np
     count = len(blobs.centres)
     if count < 2:
         return
+    # Heavy to import, and a daemon that serves poses looks for no disks.
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     farthest = MOST_APART * target.spacing / target.disk_diameter
     apart, other = (
         np.asarray(each) for each in cKDTree(blobs.centres).query(blobs.centres, k=min(NEIGHBOURS, count))

@@ -19,6 +19,11 @@ app = typer.Typer(help="Make the API keys that a daemon asks for, list them, or 
 Name = Annotated[str, typer.Argument(help="The key's name: who, or what, shows it.")]
 
 
+def register(parent: typer.Typer) -> None:
+    """Add the commands to `parent`."""
+    parent.add_typer(app, name="key")
+
+
 @app.command(epilog="Example: activecam key add anna --role operator")
 def add(
     name: Name,

@@ -2,28 +2,12 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from importlib import metadata
-from typing import Annotated
+from importlib import import_module, metadata
+from typing import Annotated, Final
 
 import typer
 
 from calib.errors import CalibError, ReadingsError
-from daemon.cli import (
-    audit,
-    backup,
-    demo,
-    detect,
-    doctor,
-    key,
-    pose,
-    profile,
-    serve,
-    simulate,
-    solve,
-    target,
-    truth,
-    verify,
-)
 from daemon.cli.console import errors
 from daemon.errors import DaemonError
 from daemon.profile import ProfileError
@@ -35,12 +19,24 @@ COULD_NOT, WRONG_CALL, INTERRUPTED = 1, 2, 130
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 ClickError: type[Exception] = typer.BadParameter.__mro__[2]
 
-app = typer.Typer(
-    name="activecam",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+MODULES: Final = {
+    "demo": "demo",
+    "serve": "serve",
+    "audit": "audit",
+    "simulate": "simulate",
+    "doctor": "doctor",
+    "detect": "detect",
+    "solve": "solve",
+    "pose": "pose",
+    "verify": "verify",
+    "truth": "truth",
+    "target": "target",
+    "backup": "backup",
+    "restore": "backup",
+    "profile": "profile",
+    "key": "key",
+}
+"""Where each command is, in the order of the help."""
 
 
 def _print_version(asked: bool) -> None:
@@ -49,8 +45,7 @@ def _print_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
-def activecam(
+def _activecam(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
     ] = False,
@@ -58,10 +53,21 @@ def activecam(
     """Calibrate a camera on motorised axes with the camera itself, and serve its pose."""
 
 
-for command in (demo, serve, audit, simulate, doctor, detect, solve, pose, verify, truth, target, backup):
-    command.register(app)
-app.add_typer(profile.app, name="profile")
-app.add_typer(key.app, name="key")
+def command_line(asked: str | None = None) -> typer.Typer:
+    """Return the command that is `asked`, or all where it is none of them.
+
+    Only its module is imported: a daemon shall not wait for what solves, draws and prints.
+    """
+    app = typer.Typer(
+        name="activecam",
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    app.callback()(_activecam)
+    for module in [MODULES[asked]] if asked in MODULES else dict.fromkeys(MODULES.values()):
+        import_module(f"daemon.cli.{module}").register(app)
+    return app
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -73,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _run(arguments: list[str]) -> int:
     try:
         # Without click's own handling a command's return value comes back instead of an exit.
-        status = app(arguments, standalone_mode=False)
+        status = command_line(arguments[0])(arguments, standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
     except BrokenPipeError:

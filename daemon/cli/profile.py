@@ -11,6 +11,11 @@ from daemon.profile import Profile, ProfileError, load_profile, shipped_profiles
 app = typer.Typer(help="Check a rig's profile, or list those that are shipped.")
 
 
+def register(parent: typer.Typer) -> None:
+    """Add the commands to `parent`."""
+    parent.add_typer(app, name="profile")
+
+
 @app.command(epilog="Example: activecam profile check my-rig.toml")
 def check(
     profile: Annotated[str, typer.Argument(help="A profile file, or a shipped one's name.")],

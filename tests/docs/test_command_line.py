@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import typer
 
-from daemon.cli.main import app, main, spread_numbers
+from daemon.cli.main import MODULES, command_line, main, spread_numbers
 from tests.docs.pages import Block, blocks, page, pages
 
 PAGE = "reference/command-line.md"
-ROOT: Any = typer.main.get_command(app)
+ROOT: Any = typer.main.get_command(command_line())
 
 
 def _leaves(command: Any, name: str) -> Iterator[tuple[str, Any]]:
@@ -71,6 +71,13 @@ def test_every_option_is_described(name: str) -> None:
         for option in parameter.opts:
             if option.startswith("-") and option != "--help":
                 assert option in section, f"{PAGE}: {name} has an option {option}"
+
+
+def test_every_command_is_found_without_the_others() -> None:
+    assert set(MODULES) == set(ROOT.commands)
+    for name in MODULES:
+        alone: Any = typer.main.get_command(command_line(name))
+        assert name in alone.commands
 
 
 def test_every_command_has_help_with_an_example() -> None:

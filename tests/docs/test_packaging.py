@@ -14,11 +14,11 @@ import pytest
 import typer
 
 from daemon.api.rules import PREFIX, ROLES
-from daemon.cli.main import app
+from daemon.cli.main import command_line
 
 ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "packaging" / "activecam.service"
-COMMAND: Any = typer.main.get_command(app)
+COMMAND: Any = typer.main.get_command(command_line())
 
 
 def parses(words: list[str]) -> dict[str, Any]:
