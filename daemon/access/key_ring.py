@@ -63,7 +63,10 @@ class KeyRing:
     async def tell(self) -> None:
         """Let the store know which keys were used when; raises StoreError."""
         used, self._used, self._told = self._used, {}, time.monotonic()
-        if used:
-            await self._stored.used(
-                {digest: datetime.fromtimestamp(when, UTC) for digest, when in used.items()}
-            )
+        times = {digest: datetime.fromtimestamp(when, UTC) for digest, when in used.items()}
+        try:
+            if times:
+                await self._stored.used(times)
+        except StoreError:
+            self._used = used | self._used
+            raise

@@ -3,9 +3,11 @@
 Its parts:
 
     app             all routes together
-    guard           what no route gets to see
+    guard           what no route gets to see;  observed  each request's id, log record and time
+    gate            who is let in, by rules;  witness  what is written down of it;  security  what is described of it
     problems        errors as problem documents;  dependencies, bodies  what routes are given
-    rig, lease, axes, camera, runs, calibrations, poses, pose_stream, metrics
+    once            requests that are carried out once, however often they are sent
+    rig, health, lease, axes, camera, runs, calibrations, poses, pose_stream, metrics, session, audit
                     routes by what they are about;  *_documents  their larger answers
     reference       all of it as a page to read
 """

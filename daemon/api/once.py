@@ -10,6 +10,7 @@ from fastapi import Depends, Header, Request, Response
 from fastapi.routing import APIRoute
 
 from daemon.api import problems
+from daemon.api.witness import leave_unwritten
 from daemon.errors import (
     IdempotencyConflictError,
     IdempotencyInProgressError,
@@ -80,6 +81,7 @@ async def _carried_out(
     service: Service = request.app.state.service
     given = await service.answers.begin(key, await _fingerprint(request), durable=durable)
     if given is not None:
+        leave_unwritten(request.scope)
         headers = {"Idempotency-Replayed": "true"} | ({"Location": given.location} if given.location else {})
         return Response(given.body, given.status, headers, given.media_type)
     try:

@@ -59,7 +59,7 @@ class Witness:
             raise
         finally:
             beginning.cancel()
-            if self._noted or not (self._scope.get(_UNWRITTEN) and self.entry.status == 200):
+            if self._noted or not self._scope.get(_UNWRITTEN):
                 self._note()
 
     def _note(self) -> None:
@@ -89,5 +89,5 @@ _UNWRITTEN: Final = "activecam.unwritten"
 
 
 def leave_unwritten(scope: Scope) -> None:
-    """Keep a request that succeeds out of the audit log: it only goes on with what is in it."""
+    """Keep a request out of the audit log: it does nothing that is not in there already."""
     scope[_UNWRITTEN] = True

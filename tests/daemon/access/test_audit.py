@@ -88,6 +88,15 @@ async def test_a_renewal_that_fails_is_written(client: httpx.AsyncClient, servic
     assert (latest["who"], latest["status"], latest["code"]) == (None, 409, "lease_held")
 
 
+async def test_what_is_answered_again_is_not_written_again(client: httpx.AsyncClient) -> None:
+    named = {"Idempotency-Key": "first"}
+    for _ in range(3):
+        answer = await client.post("/lease", json={"owner": "anna"}, headers=named)
+        assert answer.status_code == 200
+    assert answer.headers["Idempotency-Replayed"] == "true"
+    assert len((await client.get("/audit")).json()) == 1
+
+
 async def test_of_a_long_body_the_beginning_is_kept(client: httpx.AsyncClient) -> None:
     await client.post("/lease", json={"owner": "anna", "note": "x" * 2 * KEPT})
     [done] = (await client.get("/audit")).json()
