@@ -19,6 +19,7 @@ NAMES: Final = (
     "pose_rate",
     "stop_time",
     "start_time",
+    "shutdown_time",
     "efficiency",
     "uncertainty",
     "pictures",

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import ipaddress
 import logging
 import os
@@ -157,6 +158,9 @@ async def _serve(
         ):
             for number in SIGNALS:
                 loop.add_signal_handler(number, server.handle_exit, number, None)
+            # What is loaded now stays: the collector would look at it again and again, and at the end for longer than
+            # all else takes.
+            gc.freeze()
             if on_ready is not None:
                 on_ready(address_of(listening, door.tls))
             supervisor.tell(

@@ -39,6 +39,8 @@ def log_to_stderr(form: LogFormat, level: LogLevel) -> None:
     logging.basicConfig(level=max(number, logging.INFO), handlers=[handler], force=True)
     for name in OURS:
         logging.getLogger(name).setLevel(number)
+    # It logs addresses with their queries, and our own records say all else that it does.
+    logging.getLogger("uvicorn").setLevel(max(number, logging.WARNING))
 
 
 class TextLines(logging.Formatter):

@@ -80,11 +80,12 @@ def test_libraries_are_not_heard_at_debug(capsys: pytest.CaptureFixture[str]) ->
     try:
         log_to_stderr(LogFormat.JSON, LogLevel.DEBUG)
         logging.getLogger("websockets.server").debug("< Authorization: Bearer secret")
+        logging.getLogger("uvicorn.error").info('"WebSocket /pose/stream?key=secret" [accepted]')
         logging.getLogger("daemon.api").debug("seen")
     finally:
         root.handlers[:] = before
         root.setLevel(logging.WARNING)
-        for name in OURS:
+        for name in (*OURS, "uvicorn"):
             logging.getLogger(name).setLevel(logging.NOTSET)
     assert [json.loads(line)["message"] for line in capsys.readouterr().err.splitlines()] == ["seen"]
 
