@@ -76,6 +76,7 @@ async def test_an_answer_says_how_old_and_how_far_out_it_is(
     assert 0 <= inside["age_s"] < 2
     assert inside["timestamp"].endswith("Z")
     await calibrated.rig.move({"pan": 15.0})
+    await calibrated.rig.fresh_snapshot(calibrated.rig.clock.now())
     beyond = (await client.get("/pose")).json()
     assert beyond["out_of_range"] == ["pan"]
     assert beyond["timestamp"] > inside["timestamp"]

@@ -47,6 +47,19 @@ async def outcome(http: httpx.AsyncClient, route: str, headers: dict[str, str]) 
         return answer.status_code, code
 
 
+async def status_of(address: str, asked: str, headers: dict[str, str] | None = None) -> int:
+    """Send a method and an address as they stand here, of which clients would make something else."""
+    host, _, port = address.removeprefix("http://").partition(":")
+    sent = {"Host": host, "Connection": "close", "Content-Length": "0"} | (headers or {})
+    reader, writer = await asyncio.open_connection(host, int(port))
+    head = "".join(f"{name}: {value}\r\n" for name, value in sent.items())
+    writer.write(f"{asked} HTTP/1.1\r\n{head}\r\n".encode())
+    status = (await reader.read()).split(b" ")[1]
+    writer.close()
+    await writer.wait_closed()
+    return int(status)
+
+
 async def main(address: str, key: str, *routes: str) -> None:
     async with httpx.AsyncClient(base_url=address, timeout=30) as http:
         answers = [

@@ -1,6 +1,5 @@
 """What comes from elsewhere, under another name or in too many bytes, is refused before any route sees it."""
 
-import asyncio
 import itertools
 import json
 from collections.abc import AsyncIterator
@@ -14,6 +13,7 @@ from daemon.api import create_app
 from daemon.api.guard import LARGEST_BODY
 from daemon.server import LARGEST_MESSAGE, Door, address_of, bind, serving
 from daemon.service import Service
+from tests.daemon.access.asking import status_of
 from tests.daemon.access.keys import close_code
 
 LOCAL = "http://localhost"
@@ -137,11 +137,5 @@ async def test_an_id_leads_nowhere_but_to_its_record(address: str) -> None:
         "/calibrations/%00",
         "/axes/..%2f..%2fstop",
     )
-    host, _, port = address.removeprefix("http://").partition(":")
-    for path in paths:  # each sent as it stands here: clients would make something else of it
-        reader, writer = await asyncio.open_connection(host, int(port))
-        writer.write(f"GET /api/v1{path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
-        status = (await reader.read()).split(b" ")[1]
-        writer.close()
-        await writer.wait_closed()
-        assert status == b"404", path
+    for path in paths:
+        assert await status_of(address, f"GET /api/v1{path}") == 404, path

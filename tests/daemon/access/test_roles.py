@@ -12,7 +12,7 @@ from daemon.access.roles import Role
 from daemon.api import create_app
 from daemon.api.rules import Rules
 from daemon.service import Service
-from tests.daemon.access.asking import outcome
+from tests.daemon.access.asking import outcome, status_of
 from tests.daemon.access.commands import ALL
 from tests.daemon.access.keys import bearer
 
@@ -102,6 +102,37 @@ async def test_what_a_role_may_is_let_through(
                 "not_found",
                 "method_not_allowed",
             }, route
+
+
+async def test_no_way_of_writing_an_address_gets_past_a_role(
+    guarded: Service, address: str, secrets: dict[Role, str]
+) -> None:
+    before = await state(guarded)
+    disguised = {
+        "X-HTTP-Method-Override": "POST",
+        "X-Original-URL": "/api/v1/stop",
+        "X-Forwarded-Prefix": "/api/v1",
+    }
+    for asked, expected in {
+        "POST /api/v1/%73top": 403,
+        "POST /api/v1%2Fstop": 403,
+        "POST /api/v1/axes%2Fpan/home": 403,
+        "POST /api/v1/stop?role=admin": 403,
+        "POST /api/v1/stop/": 404,
+        "POST /api/v1//stop": 404,
+        "POST /api/v1/./stop": 404,
+        "POST /api/v1/pose/../stop": 404,
+        "POST /api/v1/stop;pose": 404,
+        "POST /api/v1/Stop": 404,
+        "POST http://localhost/api/v1/stop": 404,
+        "GET /api/v1/stop": 405,
+        "PUT /api/v1/stop": 405,
+        "post /api/v1/stop": 405,
+        "GET /api/v1/pose": 409,  # nothing is calibrated
+    }.items():
+        status = await status_of(address, asked, bearer(secrets[Role.VIEWER]) | disguised)
+        assert status == expected, asked
+    assert await state(guarded) == before
 
 
 async def test_what_is_no_key_is_none(http: httpx.AsyncClient) -> None:
