@@ -9,7 +9,9 @@ an empty endpoint or of the paper from the same run, and what is timed is timed 
     live_rate      with the pictures of the next
     detection_accuracy   with its pictures (rendered_plates), their bound (picture_bound), and OpenCV (peer_detectors)
     stop_time      over the emulators of drivers.emulators
-    pose_rate      with its servers (pose_server, bare_server; server_process) and its client (http_client)
+    stop_under_load  with its server (table_server) and devices (emulated_table)
+    pose_rate, pose_many, pose_in_a_run
+                   with their servers (pose_server, bare_server; server_process) and client (http_client)
     true_rig, random_rigs   rigs with known truth, and sessions of theirs with noise
     efficiency     with the bound that it judges by (cramer_rao)
     uncertainty    and its figure in the documentation (uncertainty_figure)

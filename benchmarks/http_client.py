@@ -47,6 +47,8 @@ class Connection(asyncio.Protocol):
 
     async def repeat(self, request: bytes, count: int) -> list[float]:
         """Send `request` `count` times, each when the one before it is answered; return the latencies (s)."""
+        if self._transport.is_closing():
+            raise AnswerError("the server hung up before it was asked")
         self._request, self._left, self._latencies = request, count, []
         self._done = asyncio.get_running_loop().create_future()
         self._send()

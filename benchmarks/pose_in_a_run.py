@@ -59,17 +59,16 @@ def _percentile(latencies: list[float], percent: int) -> float:
 
 async def _measure(address: str, rounds: int, longest: float) -> tuple[list[list[float]], list[list[float]]]:
     """Return the latencies (s) before and during each run, of which no more than `longest` s are listened to."""
-    asking, other = await connect(address, 2)
-    await home(other)
+    (asking,) = await connect(address, 1)
+    await home(asking)
     idle, loaded = [], []
     for _ in range(rounds):
-        over = asyncio.create_task(asyncio.sleep(min(longest, 5.0)))
-        idle.append(await _paced(asking, over))
+        idle.append(await _paced(asking, asyncio.create_task(asyncio.sleep(min(longest, 5.0)))))
+        (other,) = await connect(address, 1)
         run = json.loads(await send(other, "POST", "/api/v1/runs", b"{}"))["id"]
-        over = asyncio.create_task(_end(other, run, longest))
-        loaded.append(await _paced(asking, over))
+        loaded.append(await _paced(asking, asyncio.create_task(_end(other, run, longest))))
+        other.close()
     asking.close()
-    other.close()
     return idle, loaded
 
 

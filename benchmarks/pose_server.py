@@ -13,7 +13,7 @@ from pathlib import Path
 from fastapi import Request, Response
 
 from benchmarks.paper_rig import paper_profile, session_of_points
-from calib import solve
+from calib import Calibration, solve
 from daemon.api import poses, rules
 from daemon.server import serve
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
@@ -24,14 +24,13 @@ CONSTANT = "/api/v1/pose/constant"
 
 def main(folder: Path) -> None:
     """Serve until SIGTERM."""
-    asyncio.run(_store_calibration(folder))
+    asyncio.run(store_calibration(folder, solve(session_of_points(views=22, noise_px=0.1))))
     _add_constant_route()
     serve(paper_profile(), folder, port=0, on_ready=lambda address: print(address, flush=True))
 
 
-async def _store_calibration(folder: Path) -> None:
+async def store_calibration(folder: Path, calibration: Calibration) -> None:
     """Store a calibration as a run would that has succeeded, so that the daemon starts with it."""
-    calibration = solve(session_of_points(views=22, noise_px=0.1))
     store, now = await Store.open(folder), datetime.now(UTC)
     run = RunRecord("run", RunState.RUNNING, "paper-table", "{}", "sessions/run", "benchmark", "", now, now)
     record = CalibrationRecord(

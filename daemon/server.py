@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import socket
+import sys
 from collections.abc import AsyncIterator, Callable, Collection, Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,9 @@ logger = logging.getLogger(__name__)
 
 DEFAULT_HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
+SWITCH_INTERVAL: Final = 0.5e-3
+"""Seconds after which a thread that computes lets the others run. The loop's thread waits for its turn after each call
+to the system, several times a request: at Python's own 5 ms answers, and stops, wait for a run's detection."""
 GRACE: Final = 0.5
 """Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -105,6 +109,7 @@ def serve(
             "serve with --tls-certificate and --tls-key",
             host,
         )
+    sys.setswitchinterval(SWITCH_INTERVAL)
     door = Door({host, *host_names}, keys=keys or not local, proxy=keys and local, tls=tls)
     try:
         asyncio.run(_serve(profile, data, listening, door, on_ready))

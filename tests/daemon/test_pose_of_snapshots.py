@@ -2,8 +2,8 @@
 
 import asyncio
 import json
-from collections.abc import Iterator
-from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daemon.api import pose_stream, problems
+from daemon.pose import PoseService
 from daemon.rig import AxisSnapshot, Rig, RigSnapshot, make_devices
 from daemon.service import Service
-from daemon.store import Store
 from tests.daemon.calibrations import calibrate
 from tests.daemon.rigs import small_rig
 
@@ -23,16 +23,13 @@ LOW, HIGH = [0.0, -12.0], [100.0, 12.0]
 
 
 @pytest.fixture(scope="module")
-def still(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A calibrated service whose rig is never opened: its snapshots are set by hand."""
-    folder = tmp_path_factory.mktemp("snapshots")
-    profile = small_rig(Path(folder), time_scale=1.0)
+def still(tmp_path_factory: pytest.TempPathFactory) -> Service:
+    """As much of a calibrated service as poses need; its rig is never opened: its snapshots are set by hand."""
+    profile = small_rig(tmp_path_factory.mktemp("snapshots"), time_scale=1.0)
     rig = Rig(profile, make_devices(profile))
-    store = asyncio.run(Store.open(folder / "data"))
-    service = Service(profile, rig, store)
+    service = cast(Service, SimpleNamespace(profile=profile, rig=rig, poses=PoseService(rig)))
     calibrate(service)
-    yield service
-    asyncio.run(store.close())
+    return service
 
 
 @st.composite
