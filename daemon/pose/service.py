@@ -73,6 +73,7 @@ class PoseService:
         if latest is None or latest[0] is not snapshot:
             latest = snapshot, written(self._answer(active, snapshot, camera))[:-1]
             self._latest[camera] = latest
+        self._given(1)
         return b'%s,"age_s":%.6f}' % (latest[1], age)
 
     def readings_now(self) -> tuple[Array, Array]:
