@@ -92,11 +92,13 @@ async def running_access(store: Store, *, keys_asked: bool) -> AsyncIterator[Acc
     try:
         yield access
     finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
         try:
             await access.ring.tell()
             await access.book.write()
         except StoreError as error:
             logger.error("the last of the audit log could not be written: %s", error)  # noqa: TRY400
+        finally:
+            # Only now: a write that was cancelled would be done all the same, and then once more.
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)

@@ -10,6 +10,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from daemon.access.access import Caller
 from daemon.access.book import AuditBook
 from daemon.access.entries import AuditEntry
+from daemon.api.problems import MEDIA_TYPE
 from daemon.operation.log_fields import log_fields
 
 KEPT: Final = 1000
@@ -26,6 +27,7 @@ class Witness:
         self._scope = scope
         self._asked = bytearray()
         self._answered = bytearray()
+        self._is_problem = False
         self._noted = False
         self.entry = AuditEntry(
             time=datetime.now(UTC),
@@ -73,7 +75,8 @@ class Witness:
     def _answer(self, message: Message) -> None:
         if message["type"] == "http.response.start":
             self.entry.status = message["status"]
-        elif self.entry.status is not None and self.entry.status >= 400:
+            self._is_problem = (b"content-type", MEDIA_TYPE.encode()) in message["headers"]
+        elif self._is_problem:
             self._answered += message.get("body", b"")
             if not message.get("more_body", False):
                 self.entry.code = json.loads(self._answered)["code"]
