@@ -6,8 +6,9 @@ BIN := $(VENV)/bin
 PEERS := .venv-peers
 PROFILE ?= paper-table
 DATA ?= activecam-data
+FUZZ_EXAMPLES ?= 300
 
-.PHONY: demo test test-kernel test-kill lint format serve bench bench-peers figures clean
+.PHONY: demo test test-kernel test-kill test-fuzz lint format serve bench bench-peers figures clean
 
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
@@ -22,6 +23,9 @@ test-kernel: $(VENV)/.installed-dev ## The drivers against real kernel devices, 
 test-kill: $(VENV)/.installed-dev ## Daemons killed at 200 random moments of runs, and disks that fill at 40: what was found each time
 	$(BIN)/python -m tests.daemon.kills 200
 	$(BIN)/python -m tests.daemon.full_disks 40
+
+test-fuzz: $(VENV)/.installed-dev ## Clients, devices and disks that do anything at any time, FUZZ_EXAMPLES times
+	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest --timeout 0 tests/daemon/fuzz
 
 lint: $(VENV)/.installed-dev ## Style, types, and who imports whom
 	$(BIN)/ruff check .

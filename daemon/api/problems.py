@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
 
-from fastapi import FastAPI, Request, Response
-from fastapi.exceptions import RequestValidationError
+from fastapi import FastAPI, Request, Response, WebSocket
+from fastapi.exceptions import RequestValidationError, WebSocketRequestValidationError
 from pydantic import BaseModel, Field
 from pydantic_core import to_json
 from starlette.exceptions import HTTPException
@@ -77,7 +77,6 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
 }
 INVALID: Final = Kind(422, "invalid_request", "The request is not what this address takes")
 HTTP_PROBLEMS: Final = {
-    400: Kind(400, "bad_request", "The request cannot be read"),
     404: Kind(404, "not_found", "There is nothing at this address"),
     405: Kind(405, "method_not_allowed", "This address does not take this method"),
 }
@@ -154,6 +153,7 @@ def install(app: FastAPI) -> None:
     for tree in (drivers.DriverError, CalibError, daemon.DaemonError):
         app.add_exception_handler(tree, _answer_known)
     app.add_exception_handler(RequestValidationError, _answer_invalid)
+    app.exception_handler(WebSocketRequestValidationError)(_refuse_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
     app.add_exception_handler(Exception, _answer_unexpected)
 
@@ -182,12 +182,20 @@ async def _answer_known(request: Request, error: Exception) -> Response:
     return respond(request, kind, str(error), headers)
 
 
+async def _refuse_invalid(socket: WebSocket, error: WebSocketRequestValidationError) -> None:
+    await socket.send_denial_response(_invalid(socket, [_invalid_field(e) for e in error.errors()]))
+
+
 async def _answer_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     wrong = [_invalid_field(e) for e in error.errors()]
     if wrong[0]["field"] == "body" and "json" not in request.headers.get("content-type", ""):
         # The commonest slip with curl, which says that what it sends is a form.
         wrong = [{"field": "body", "message": "Send JSON, with the header Content-Type: application/json"}]
+    return _invalid(request, wrong)
+
+
+def _invalid(request: HTTPConnection, wrong: list[dict[str, str]]) -> Response:
     more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
     detail = f"{wrong[0]['field']}: {wrong[0]['message']}{more}"
     return respond(request, INVALID, detail, errors=wrong)
@@ -202,6 +210,12 @@ def _invalid_field(error: Mapping[str, Any]) -> dict[str, str]:
 
 async def _answer_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if (
+        error.status_code == HTTPStatus.BAD_REQUEST
+    ):  # what FastAPI says of bytes that are no text, let alone JSON
+        return _invalid(
+            request, [{"field": "body", "message": "Not JSON: it cannot be read as text in UTF-8"}]
+        )
     kind = (
         BODY_TOO_LARGE if error.status_code == BODY_TOO_LARGE.status else HTTP_PROBLEMS.get(error.status_code)
     )

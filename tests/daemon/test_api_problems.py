@@ -94,6 +94,7 @@ async def test_http_has_problems_of_its_own(
         ("application/x-www-form-urlencoded", b'{"owner": "anna"}', "Content-Type: application/json"),
         ("text/plain", b'{"owner": "anna"}', "Content-Type: application/json"),
         ("application/json", b'{"owner": ', "body: Not JSON at character 10"),
+        ("application/json", b'{"owner": "\xff"}', "body: Not JSON: "),
         ("application/json", b'{"owner": "anna", "ttl": 5}', "body.ttl: Extra inputs"),
         ("application/json", b'{"owner": "anna", "ttl_s": -1}', "body.ttl_s: "),
         ("application/json", b'{"owner": "anna", "ttl_s": NaN}', "body.ttl_s: "),

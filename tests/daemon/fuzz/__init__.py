@@ -1,0 +1,1 @@
+"""The daemon among clients that ask anything, in any order."""
