@@ -11,6 +11,7 @@ import socket
 import sys
 from collections.abc import AsyncIterator, Callable, Collection, Generator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -156,11 +157,13 @@ async def _serve(
     # Until the server takes them over, a signal ends the opening of the devices in an orderly way.
     for number in SIGNALS:
         loop.add_signal_handler(number, main.cancel)
+    # It takes long, and so do devices.
+    imported = loop.run_in_executor(None, import_module, "daemon.api")
     try:
-        async with (
-            running_service(profile, data, keys_asked=door.keys) as service,
-            serving(service, listening, door) as server,
-        ):
+        async with contextlib.AsyncExitStack() as opened:
+            service = await opened.enter_async_context(running_service(profile, data, keys_asked=door.keys))
+            await imported
+            server = await opened.enter_async_context(serving(service, listening, door))
             for number in SIGNALS:
                 loop.add_signal_handler(number, server.handle_exit, number, None)
             # What is loaded now stays: the collector would look at it again and again, and at the end for longer than
