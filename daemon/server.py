@@ -8,7 +8,6 @@ import logging
 import os
 import signal
 import socket
-import sys
 from collections.abc import AsyncIterator, Callable, Collection, Generator
 from dataclasses import dataclass
 from importlib import import_module
@@ -29,9 +28,6 @@ logger = logging.getLogger(__name__)
 
 DEFAULT_HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
-SWITCH_INTERVAL: Final = 0.5e-3
-"""Seconds after which a thread that computes lets the others run. The loop's thread waits for its turn after each call
-to the system, several times a request: at Python's own 5 ms answers, and stops, wait for a run's detection."""
 GRACE: Final = 0.5
 """Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -110,7 +106,6 @@ def serve(
             "serve with --tls-certificate and --tls-key",
             host,
         )
-    sys.setswitchinterval(SWITCH_INTERVAL)
     door = Door({host, *host_names}, keys=keys or not local, proxy=keys and local, tls=tls)
     try:
         asyncio.run(_serve(profile, data, listening, door, on_ready))
