@@ -229,13 +229,14 @@ class Cia402Axis(SupervisedAxis):
     ) -> bool:
         """Wait until a sample is as wanted; return False where it is not in `time` (s).
 
-        Raises MotionStoppedError, and DeviceFaultError unless the drive may be `in_fault`.
+        Raises MotionStoppedError, and DeviceFaultError where the drive is not enabled, unless it may be `in_fault`.
         """
         end = self._clock.now() + time
         while not until(sample := await self._drive.sample()):
             self._drive.require_permit(permit)
             if not in_fault:
                 await self._require_no_fault(sample)
+                self._require_enabled(sample)
             if self._clock.now() >= end:
                 return False
             await self._clock.sleep(self._poll)

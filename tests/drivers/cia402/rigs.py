@@ -1,5 +1,6 @@
 """A CAN bus with two emulated drives on it, the controller that drives them, and a tap that hears all."""
 
+import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from itertools import count
@@ -154,6 +155,5 @@ async def homed(
 ) -> AsyncIterator[Rig]:
     """Drives with an open controller, and homed."""
     async with opened(slide, pan, **options) as rig:
-        for axis in rig.controller.axes.values():
-            await axis.home()
+        await asyncio.gather(*(axis.home() for axis in rig.controller.axes.values()))
         yield rig

@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import socket
 import threading
 import time
 from typing import Any
@@ -164,6 +165,16 @@ async def test_an_interface_that_is_not_there_is_a_loss_in_words() -> None:
         await link.open()
     with pytest.raises(DeviceLostError, match="is not open: open it first"):
         await link.ask(lambda _: None)
+
+
+async def test_what_is_said_by_multicast_stays_on_the_machine() -> None:
+    options = Cia402Options(interface="udp_multicast", channel="239.74.163.2")
+    link = Link(options, [1])
+    await link.open()
+    said_by = socket.socket(fileno=socket.dup(link.require_open().bus.fileno()))
+    with said_by:
+        assert said_by.getsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL) == 0
+    await link.close()
 
 
 async def test_a_serial_adapter_that_is_not_there_is_a_loss_in_words() -> None:

@@ -12,7 +12,7 @@ from drivers.errors import (
     MotionStoppedError,
     NotHomedError,
 )
-from tests.drivers.cia402.rigs import SLIDE, Rig, homed, opened, under_way
+from tests.drivers.cia402.rigs import SLIDE, Rig, commanded, homed, opened, under_way
 
 
 async def halted_on_the_way(rig: Rig, target: float = 18.0) -> float:
@@ -203,6 +203,17 @@ async def test_a_drive_that_leaves_its_motion_by_itself_is_not_waited_for() -> N
         move = asyncio.create_task(rig.slide.move(18.0))
         await under_way(rig, rig.slide)
         rig.emulator.disable("slide")
+        with pytest.raises(DeviceFaultError, match=r"left its motion by itself and is 'switch-on disabled'"):
+            await move
+
+
+async def test_a_drive_that_is_switched_off_during_the_handshake_is_not_waited_for() -> None:
+    async with homed() as rig:
+        rig.emulator.nodes["slide"].servo.set_point_delay = 60.0
+        with rig.tap() as tap:
+            move = asyncio.create_task(rig.slide.move(18.0))
+            await commanded(rig, tap, 1, 0x003F)
+            rig.emulator.disable("slide")
         with pytest.raises(DeviceFaultError, match=r"left its motion by itself and is 'switch-on disabled'"):
             await move
 

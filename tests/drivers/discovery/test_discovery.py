@@ -41,6 +41,18 @@ def test_a_serial_port_has_its_lasting_name_its_identity_and_its_driver(tree: Tr
     assert port.driver == "ch341-uart"
 
 
+def test_of_two_adapters_that_share_a_name_by_id_one_has_a_name_by_path_alone(tree: Tree) -> None:
+    for name in "ttyUSB0", "ttyUSB1":
+        node = tree.serial_port(name)
+        tree.link(f"dev/serial/by-path/pci-usb-{name[-1]}", node)
+    tree.link(
+        "dev/serial/by-id/usb-Acme", tree.root / "dev/ttyUSB1"
+    )  # where the later one's link took its place
+    first, second = serial_ports(tree.machine)
+    assert first.names == ("/dev/serial/by-path/pci-usb-0",)
+    assert second.names == ("/dev/serial/by-id/usb-Acme", "/dev/serial/by-path/pci-usb-1")
+
+
 def test_terminals_and_ports_that_no_mainboard_has_are_none(tree: Tree) -> None:
     tree.write("sys/class/tty/tty0/dev", "4:0")
     tree.node("tty0")

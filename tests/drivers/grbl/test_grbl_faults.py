@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Mapping
 
 import pytest
 
-from drivers.errors import DeviceFaultError, DeviceLostError, DriverError, MotionError
+from drivers.errors import DeviceFaultError, DeviceLostError, DriverError, MotionError, NotHomedError
 from tests.drivers.grbl.benches import QUICK, SLOW_HOMING, Table, homed, moving, plugged, until
 
 BOUND = 30.0
@@ -161,6 +161,29 @@ async def test_bytes_that_are_lost_both_ways_never_make_a_wrong_arrival_a_succes
             pytest.fail("no byte was lost")
         await at_rest(table)
         await recovered(table)
+
+
+async def test_a_motion_that_was_not_answered_is_not_sent_again() -> None:
+    async with homed() as table:
+        sent = bytearray()
+        firmware, hears = table.emulator.firmware, table.emulator.firmware.receive
+
+        def overhear(data: bytes) -> None:
+            sent.extend(data)
+            if b"$J" in data:
+                table.emulator.mute()  # the motion is under way, and its ok is lost
+            hears(data)
+
+        firmware.receive = overhear  # type: ignore[method-assign]
+        with pytest.raises(DeviceLostError):
+            await table.slide.move(55.0)
+        stood = await at_rest(table)
+        table.emulator.repair()
+        await table.controller.open()
+        with pytest.raises(NotHomedError):  # where it stands is found out before anything moves
+            await table.slide.move(55.0)
+        assert await at_rest(table) == stood
+        assert sent.count(b"$J") == 1
 
 
 async def test_lost_steps_are_found_by_homing_alone() -> None:
