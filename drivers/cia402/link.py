@@ -7,7 +7,7 @@ import logging
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, TypeVar
 
@@ -22,6 +22,8 @@ Result = TypeVar("Result")
 
 _PATIENCE: Final = 0.1
 """Seconds that a full transmit queue is given to drain."""
+_MAY_HOLD_UP: Final = frozenset({"slcan"})
+"""Interfaces that may keep who sends waiting: an adapter whose serial port takes nothing any more."""
 _HEARTBEAT: Final = 0x700
 _OPERATIONAL: Final = b"\x05"
 _NODE: Final = 0x07F
@@ -92,14 +94,25 @@ class Link:
         """Have `send` called at once, past every question. It must not wait for an answer."""
         network = self.require_open()
         assert self._stopping is not None
-        await self._in_thread(self._stopping, lambda: send(network))
+        if self.options.interface in _MAY_HOLD_UP:
+            await self._in_thread(self._stopping, lambda: send(network))
+        else:
+            # Not in another thread, whose turn is long in coming on a busy machine.
+            with self._in_words():
+                send(network)
 
     async def _in_thread(self, thread: ThreadPoolExecutor, work: Callable[[], Result]) -> Result:
         return await finish(self._translated(thread, work))
 
     async def _translated(self, thread: ThreadPoolExecutor, work: Callable[[], Result]) -> Result:
-        try:
+        with self._in_words():
             return await asyncio.get_running_loop().run_in_executor(thread, work)
+
+    @contextlib.contextmanager
+    def _in_words(self) -> Iterator[None]:
+        """Raise DeviceLostError for what the CAN libraries raise."""
+        try:
+            yield
         except DriverError:
             raise  # some of them are OSErrors, too
         except (can.CanError, OSError) as error:
