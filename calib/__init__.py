@@ -17,7 +17,7 @@ data flows through them:
     nominal, unfinished          sessions with a drawing, and sessions that were cut off
     prediction, second_look      where the target should be, and what is found of it there
     likelihood/, most_likely     the fit;  advice  what it does not tell, in words
-    corrections, warp, pose_sensor               imperfect joints, targets and sensors
+    corrections, warp, pose_sensor               imperfect joints, targets and sensors;  slips  of joints
     stated_corrections, corrections_in_words     what they are, said;  stated_quality  and how good it is
     links, dh, document          D-H and base read off the screws, and all written down: calibration
     pose_covariance, projection, dh_covariance   how sure a pose is, where a point is seen, and a D-H parameter

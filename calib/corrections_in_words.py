@@ -17,28 +17,30 @@ def corrections_in_words(
     """Return a sentence for each correction; `points` (t, 3) are the flat target's."""
     units, sentences = {joint.name: joint.reading_unit for joint in joints}, []
     for gap in stated.backlash:
-        size = _size(2 * abs(gap.half_gap), 2 * (gap.half_gap_std or 0), units[gap.joint])
+        size = size_in_words(2 * abs(gap.half_gap), 2 * (gap.half_gap_std or 0), units[gap.joint])
         sentences.append(
             f"{gap.joint}: backlash of {size} between the directions of approach, taken into account"
         )
     for wave in stated.once_per_turn:
         height = float(np.hypot(wave.cosine, wave.sine))
         deviation = float(np.hypot(wave.cosine_std or 0, wave.sine_std or 0))
-        size = _size(height, deviation, units[wave.joint])
+        size = size_in_words(height, deviation, units[wave.joint])
         sentences.append(
             f"{wave.joint}: an error of up to {size} that returns every turn, taken into account"
         )
     for share in stated.coupling:
-        size = _size(share.factor, share.factor_std or 0, units[share.joint])
+        size = size_in_words(share.factor, share.factor_std or 0, units[share.joint])
         sentences.append(
             f"{share.joint}: moves by {size} with each {units[share.by]} of {share.by}, taken into account"
         )
     if stated.target_warp is not None:
         bulge = 1e3 * float(np.ptp(stated.target_warp.bulge(points)))
         deviation = 1e3 * max(stated.target_warp.heights_std or [0.0])
-        sentences.append(f"the target is {_size(bulge, deviation, 'mm')} from flat, taken into account")
+        sentences.append(
+            f"the target is {size_in_words(bulge, deviation, 'mm')} from flat, taken into account"
+        )
     for one in stated.aspect:
-        size = _size(1e2 * one.aspect, 1e2 * (one.aspect_std or 0), "%")
+        size = size_in_words(1e2 * one.aspect, 1e2 * (one.aspect_std or 0), "%")
         sentences.append(
             f"{one.camera}: the poses given for it have the target too far out in y by {size}, taken into account"
         )
@@ -57,7 +59,7 @@ def unused_warp_in_words(warp: Mapping[str, float], points: NDArray[np.float64])
     ]
 
 
-def _size(value: float, deviation: float, unit: str) -> str:
+def size_in_words(value: float, deviation: float, unit: str) -> str:
     """Return a value with its standard deviation, as many digits of either as mean anything."""
     if deviation <= 0:
         return f"{value:.3g} {unit}"

@@ -62,6 +62,7 @@ def most_likely(
         weaknesses=weaknesses(session, refined),
         corrections=Corrections(stated, state.corrections[places]),
         sides=found.sides(Circumstances.of(session), state.corrections),
+        slips=found.slipped(state.corrections, _deviations(refined)[refined.problem.layout.corrections]),
         warp=dict(zip(found.warp, state.warp.tolist(), strict=True)),
         unused_warp={}
         if unused is None
@@ -71,6 +72,11 @@ def most_likely(
             for camera, aspect in zip(found.sensors, state.aspects, strict=True)
         },
     )
+
+
+def _deviations(refined: Refined) -> Array:
+    """Return the standard deviations (p,) of the layout's parameters."""
+    return np.sqrt(np.maximum(np.diag(refined.covariance), 0))
 
 
 def _point_noise(problem: Problem) -> float | None:

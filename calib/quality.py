@@ -13,6 +13,7 @@ from calib.coverage import coverage, missing_in_words
 from calib.observations import Observation
 from calib.residuals import ViewResidual, view_residuals
 from calib.session import Session
+from calib.slips import slips_in_words
 from calib.solution import Solution
 from calib.stated_quality import CameraCoverage, JointQuality, MeanAndMax, Quality, ViewQuality
 from calib.verdict import judgement_and_verdict
@@ -119,7 +120,8 @@ def judged(
         views=views,
         warnings=warnings,
     )
-    judgement, verdict = judgement_and_verdict(quality, session.complete, solution.weaknesses)
+    slips = slips_in_words(solution.slips, session.joints)
+    judgement, verdict = judgement_and_verdict(quality, session.complete, solution.weaknesses, slips)
     return quality.model_copy(update={"judgement": judgement, "verdict": verdict})
 
 

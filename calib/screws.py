@@ -27,6 +27,9 @@ UNEVEN = 0.3
 """How far (rad) a turn may be from what the other readings say of it: more than any noise, less than a mistake."""
 MANY = 0.25
 """Part of the turns that may be uneven before the readings as a whole are in doubt: single views may be knocked."""
+NOISE = 3.0
+"""Over a sweep a joint moves the camera by more than so many times what neighbouring views scatter by."""
+NOTHING = 1e-9  # rad, or m
 MAX_STRIDES = 48
 """In a sweep of more views than this, pairs are taken at this many distances along it."""
 
@@ -81,13 +84,16 @@ def revolute_screw(poses: Array, readings: Array, sweeps: Ints, name: str, unit:
 
 
 def prismatic_screw(poses: Array, readings: Array, sweeps: Ints, name: str) -> Screw:
-    """Return the screw of a prismatic joint (eq 29, 30); arguments as for `revolute_screw`."""
+    """Return the screw of a prismatic joint (eq 29, 30); arguments as for `revolute_screw`.
+
+    Raises UnsolvableError where it did not move.
+    """
     first, second = _pairs(readings, sweeps)
     step = readings[second] - readings[first]
     travel = poses[second, :3, 3] - poses[first, :3, 3]
     length = np.linalg.norm(travel, axis=1)
-    if length.max() < 1e-9:
-        raise UnsolvableError(f"joint '{name}' did not move the camera: check its readings, or its kind")
+    near, far = _neighbours(readings, sweeps)
+    _check_moved(poses[far, :3, 3] - poses[near, :3, 3], readings, near, far, sweeps, name)
     direction = travel / np.maximum(length, 1e-300)[:, None]
     axis = robust_mean(direction, length**2, 2)
     axis /= np.linalg.norm(axis)
@@ -121,6 +127,8 @@ def _turning_rate(poses: Array, readings: Array, sweeps: Ints, name: str, unit: 
         )
     turn = rotation_log(poses[second, :3, :3] @ np.swapaxes(poses[first, :3, :3], -1, -2))
     rate = robust_mean(turn / step[:, None], step**2, 2)
+    if np.abs(turn).max() > NOTHING:  # whole turns are another matter
+        _check_moved(turn, readings, first, second, sweeps, name)
     uneven = np.linalg.norm(turn - step[:, None] * rate, axis=1) > UNEVEN
     if uneven.mean() > MANY:
         raise UnsolvableError(
@@ -128,6 +136,24 @@ def _turning_rate(poses: Array, readings: Array, sweeps: Ints, name: str, unit: 
             "these must be less than half a turn apart, so take views in between, or look for wrong readings"
         )
     return rate
+
+
+def _check_moved(motions: Array, readings: Array, first: Ints, second: Ints, sweeps: Ints, name: str) -> None:
+    """Raise UnsolvableError where the camera's `motions` (p, 3) between neighbours are no more than noise."""
+    step = readings[second] - readings[first]
+    rate = robust_mean(motions / step[:, None], step**2, 2)
+    span = np.bincount(sweeps[first], weights=step).max()
+    scatter = np.median(np.linalg.norm(motions - step[:, None] * rate, axis=1))
+    if span * np.linalg.norm(rate) <= max(NOISE * scatter, NOTHING):
+        raise UnsolvableError(stood_still(name))
+
+
+def stood_still(name: str) -> str:
+    """Say that a joint's readings changed, and the camera did not move."""
+    return (
+        f"joint '{name}' did not move the camera, though its readings changed: is its motor powered, and coupled to "
+        "the axis, and are its readings and its kind right?"
+    )
 
 
 def _neighbours(readings: Array, sweeps: Ints) -> tuple[Ints, Ints]:

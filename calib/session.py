@@ -334,6 +334,15 @@ class Session(Document):
         values = [view.readings for view in self.views]
         return np.array(values, dtype=float).reshape(len(self.views), len(self.joints))
 
+    def read_as(self, readings: NDArray[np.float64]) -> Self:
+        """Return this session with other `readings` (n, m)."""
+        return self.with_views(
+            [
+                view.model_copy(update={"readings": row})
+                for view, row in zip(self.views, readings.tolist(), strict=True)
+            ]
+        )
+
     def approached_from(self, sides: NDArray[np.float64] | None) -> Self:
         """Return this session with `sides` (n, m) as of `sides`, as it was for None."""
         if sides is None:

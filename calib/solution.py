@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from calib.chain import Chain
 from calib.corrections import NO_CORRECTIONS, Corrections
+from calib.likelihood.imperfections import Slipped
 from calib.likelihood.refinement import Refined
 from calib.likelihood.weakness import Weakness
 from calib.session import Intrinsics, WorldOrigin
@@ -27,7 +28,7 @@ class Solution:
     (4, 4) its base. `corrections` are what imperfect joints add to their readings, `warp` the height (m) of each
     shape of the target's, and `unused_warp` about what that would be where the data support one that nobody asked
     for; `aspects` by how much a sensor that gives poses sees y too large. `sides` (n, m) are from which joints
-    approached their readings, as far as the fit has found that out.
+    approached their readings, as far as the fit has found that out; `slips` are the steps that they lost on the way.
     """
 
     chain: Chain
@@ -47,3 +48,4 @@ class Solution:
     unused_warp: dict[str, float] = field(default_factory=dict)
     aspects: dict[str, float] = field(default_factory=dict)
     sides: Array | None = None
+    slips: Sequence[Slipped] = ()

@@ -18,6 +18,7 @@ from calib.prediction import predicted_by_views
 from calib.quality import judged
 from calib.second_look import second_look
 from calib.session import Session
+from calib.slips import as_it_stood, slips_in_words
 from calib.solution import Solution
 from calib.stated_quality import Quality
 from calib.targets import target_points
@@ -68,10 +69,13 @@ def solve(
         if std is None or not fitted:
             warnings += lens_in_words(camera.name, std)
     points = target_points(session.target)
+    warnings += slips_in_words(solution.slips, session.joints)
     warnings += [*left_out_in_words(solution), *unused_warp_in_words(solution.unused_warp, points)]
     warnings += observed.warnings(session)
     calibration = document(session, method, solution, Quality())
     known = session.approached_from(solution.sides)
+    if solution.slips:
+        known = known.read_as(as_it_stood(known.readings(), solution.slips))
     quality = judged(calibration, known, observed.observations, solution, warnings)
     corrected = corrections_in_words(calibration.corrections, session.joints, points)
     if target_warp and not solution.warp:

@@ -6,7 +6,7 @@ verdict goes by views that were held out, by how sure the fit is of the poses th
     unknown   nothing was held out, and nothing is known to be wrong either
     poor      a prediction misses by more than 3 times as much as the fit; by more than a pixel and 10 times what the
               noise of points and readings and the fit's own uncertainty explain; more than a fifth of the views was set
-              aside; something is not determined at all
+              aside; something is not determined at all; a joint slipped
     usable    more than 1.5 times, more than 3 times, more than a twentieth; something is badly known; fewer than 5
               views were held out; the session was cut off; nobody knows how sure the poses are
     good      none of this
@@ -32,13 +32,14 @@ FEW_VIEWS = 5
 
 
 def judgement_and_verdict(
-    quality: Quality, complete: bool, weaknesses: Sequence[Weakness]
+    quality: Quality, complete: bool, weaknesses: Sequence[Weakness], slips: Sequence[str] = ()
 ) -> tuple[Judgement, str]:
     """Return the judgement on a calibration, from all else that its quality says, and the sentence for it.
 
-    `complete` is the session's: whether it took all its views.
+    `complete` is the session's: whether it took all its views. `slips` are sentences on joints that slipped.
     """
     poor, doubts = _faults(quality, weaknesses)
+    poor = [*slips, *poor]
     if quality.held_out_by is None and not poor:
         residual = (
             "" if quality.rms_px is None else f", and the residual of {quality.rms_px:.3g} px says little"

@@ -3,6 +3,7 @@
 A fit has some of that free to move; what is new in it starts at zero.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -23,6 +24,8 @@ FEWEST_STANDING = 3
 """Views in a row in which a joint stands, of which its side is asked for where it is not known."""
 FEWEST_A_SIDE = 3
 """Views of a moving joint that must have come from either side: one alone may as well be wrong."""
+FEWEST_A_SLIP = 3
+"""Views before and after a slip: fewer may as well be wrong."""
 LEAST_TURN = np.pi / 2
 """Of a joint's travel (rad): over less, a once-per-turn error looks like another scale."""
 
@@ -76,7 +79,40 @@ class Play:
         return np.column_stack([sides[:, self.joint], *(np.isin(views, own) for own in self.standing)])
 
 
-Fitted = Play | OncePerTurn | Coupling
+@dataclass(frozen=True)
+class Slip:
+    """Steps that a joint lost on its way to the session's view number `view`: added to its readings from there on.
+
+    It belongs to the session and not to the rig: whoever homes the joint has its readings right again.
+    """
+
+    joint: int
+    view: int
+
+    kind: ClassVar[str] = "slip"
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """How far it slipped."""
+        return (f"from.{self.view}",)
+
+    def regressors(self, readings: Array, sides: Array) -> Array:
+        """Return how much of each coefficient is added to the joint's readings (n, 1), of the whole session."""
+        del sides
+        return (np.arange(len(readings)) >= self.view)[:, None].astype(float)
+
+
+Fitted = Play | OncePerTurn | Coupling | Slip
+
+
+@dataclass(frozen=True)
+class Slipped:
+    """A joint's slip as it was found: by `size`, give or take `std`, on the way to a view, in reading units."""
+
+    joint: int
+    view: int
+    size: float
+    std: float
 
 
 @dataclass(frozen=True)
@@ -96,10 +132,21 @@ class Imperfections:
         places: list[int] = []
         first = 0
         for model in self.models:
-            models.append(Backlash(model.joint) if isinstance(model, Play) else model)
-            places += range(first, first + len(models[-1].coefficients))
+            if not isinstance(model, Slip):
+                models.append(Backlash(model.joint) if isinstance(model, Play) else model)
+                places += range(first, first + len(models[-1].coefficients))
             first += len(model.coefficients)
         return tuple(models), places
+
+    def slipped(self, coefficients: Array, deviations: Array) -> tuple[Slipped, ...]:
+        """Return the joints' slips in the order of their views; `coefficients` (k,) are the models'."""
+        found, first = [], 0
+        for model in self.models:
+            if isinstance(model, Slip):
+                size, std = float(coefficients[first]), float(deviations[first])
+                found.append(Slipped(model.joint, model.view, size, std))
+            first += len(model.coefficients)
+        return tuple(sorted(found, key=lambda slip: (slip.view, slip.joint)))
 
     def sides(self, about: Circumstances, coefficients: Array) -> Array:
         """Return the sides of approach (n, m), those that were not known being the nearest to where a joint stood."""
@@ -111,6 +158,26 @@ class Imperfections:
                     sides[list(views), model.joint] = np.clip(np.round(offset / (half_gap or np.inf)), -1, 1)
             first += len(model.coefficients)
         return sides
+
+
+def possible_slips(problem: Problem, has: Sequence[Fitted]) -> list[Slip]:
+    """Return the slips that the fit's views could show: of joints on their way from one view to the next.
+
+    On either side of each, and of those that the fit `has`, the joint is seen in some views.
+    """
+    found = []
+    for joint in range(problem.readings.shape[1]):
+        seen = np.sort(np.concatenate([group.data.views for group in problem.groups if group.link > joint]))
+        readings = problem.readings[seen, joint]
+        moved = np.abs(np.diff(readings)) > SAME_START * np.ptp(readings)
+        own = [model.view for model in has if isinstance(model, Slip) and model.joint == joint]
+        ends = [0, *np.searchsorted(seen, own), len(seen)]
+        found += [
+            Slip(joint, int(seen[place]))
+            for place in np.flatnonzero(moved) + 1
+            if min(abs(place - end) for end in ends) >= FEWEST_A_SLIP
+        ]
+    return found
 
 
 def possible_corrections(problem: Problem, estimate: Estimate, about: Circumstances) -> list[Fitted]:

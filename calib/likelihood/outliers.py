@@ -16,6 +16,7 @@ from calib.likelihood.blocks import Blocks
 from calib.likelihood.measurements import PointViews
 from calib.likelihood.normal import local_by_parameter
 from calib.likelihood.problem import Group, GroupTerms, Problem, Weights, all_in
+from calib.sweeps import SAME_START
 
 Array = NDArray[np.float64]
 
@@ -178,7 +179,7 @@ def _freedom(distances: Array) -> int:
 
 def without_bad_points(problem: Problem, found: Misfits) -> Weights:
     """Return weights with which all views count, without their bad points."""
-    return judged(problem, replace(found, spread=np.inf))[0]
+    return _judged(problem, replace(found, spread=np.inf))[0]
 
 
 def softened(problem: Problem, found: Misfits) -> Weights:
@@ -191,7 +192,21 @@ def softened(problem: Problem, found: Misfits) -> Weights:
 
 
 def judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
-    """Return weights without the outliers, and what these are."""
+    """Return weights without the outliers, and what these are.
+
+    Not all views in which a joint moved can have been knocked: it slipped, or is not what the others hold it for. Then
+    none is set aside.
+    """
+    weights, aside = _judged(problem, found)
+    seen = np.concatenate([group.data.views for group in problem.groups])
+    kept = np.setdiff1d(seen, aside.views)
+    spans = np.ptp(problem.readings[seen], axis=0)
+    if len(kept) and np.any((np.ptp(problem.readings[kept], axis=0) <= SAME_START * spans) & (spans > 0)):
+        return _judged(problem, replace(found, spread=np.inf))
+    return weights, aside
+
+
+def _judged(problem: Problem, found: Misfits) -> tuple[Weights, SetAside]:
     knocked: list[int] = []
     bad: list[tuple[int, int]] = []
     groups = []

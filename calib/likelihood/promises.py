@@ -18,7 +18,9 @@ from calib.likelihood.imperfections import (
     Circumstances,
     Fitted,
     Imperfections,
+    Slip,
     possible_corrections,
+    possible_slips,
     with_imperfections,
 )
 from calib.likelihood.measurements import GivenPoses
@@ -50,13 +52,15 @@ class Fit:
 class Candidate:
     """Imperfections with one more, or one less, of `size` coefficients, and what these `gain` in 2 log L.
 
-    Of one more, `values` is what the coefficients would be, about.
+    Of one more, `values` is what the coefficients would be, about. `slip` is the one of a joint that it is about, None
+    where it is about another imperfection.
     """
 
     imperfections: Imperfections
     size: int
     gain: float
     values: tuple[float, ...] = ()
+    slip: Slip | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +109,9 @@ class Eliminated:
 
 def promised(fit: Fit, about: Circumstances, has: Imperfections) -> list[Candidate]:
     """Return what each possible correction, and warp of the target, promises over a fit that `has` some already."""
-    options = [
-        m for m in possible_corrections(fit.problem, fit.descent.estimate, about) if not _among(m, has.models)
-    ]
+    possible = possible_corrections(fit.problem, fit.descent.estimate, about)
+    options = [m for m in possible if not _among(m, has.models)]
+    options += possible_slips(fit.problem, has.models)
     warps = [shapes for shapes in possible_warps(about.points) if set(shapes) > set(has.warp)]
     sensors = [camera for camera in _sensors(fit.problem) if camera not in has.sensors]
     every = Imperfections((*has.models, *options), warps[-1] if warps else has.warp, (*has.sensors, *sensors))
@@ -126,7 +130,8 @@ def promised(fit: Fit, about: Circumstances, has: Imperfections) -> list[Candida
     found = []
     for model in options:
         own = first + np.arange(len(model.coefficients))
-        found.append(bent.candidate(replace(has, models=(*has.models, model)), own))
+        candidate = bent.candidate(replace(has, models=(*has.models, model)), own)
+        found.append(replace(candidate, slip=_slip(model)))
         first += len(own)
     for shapes in warps:
         own = np.array([bulging + every.warp.index(shape) for shape in shapes if shape not in has.warp])
@@ -143,23 +148,31 @@ def worths(fit: Fit, has: Imperfections) -> list[Candidate]:
     """
     layout, state = fit.problem.layout, fit.descent.estimate.state
     values = np.concatenate([state.corrections, state.warp, state.aspects])
-    left_over = [
-        (replace(has, models=(*has.models[:i], *has.models[i + 1 :])), len(model.coefficients))
+    left_over: list[tuple[Imperfections, int, Slip | None]] = [
+        (
+            replace(has, models=(*has.models[:i], *has.models[i + 1 :])),
+            len(model.coefficients),
+            _slip(model),
+        )
         for i, model in enumerate(has.models)
     ]
     if has.warp:
-        left_over.append((replace(has, warp=()), len(has.warp)))
+        left_over.append((replace(has, warp=()), len(has.warp), None))
     for camera in has.sensors:
         rest = tuple(other for other in has.sensors if other != camera)
-        left_over.append((replace(has, sensors=rest), 1))
+        left_over.append((replace(has, sensors=rest), 1, None))
     found, column = [], 0
-    for less, size in left_over:
+    for less, size, slip in left_over:
         own = layout.corrections.start + np.arange(column, column + size)
         others = np.setdiff1d(np.flatnonzero(fit.problem.free), own)
         gain = Eliminated.of(fit.descent.equations, others).loss(own, values[column : column + size])
-        found.append(Candidate(less, size, gain))
+        found.append(Candidate(less, size, gain, slip=slip))
         column += size
     return found
+
+
+def _slip(model: Fitted) -> Slip | None:
+    return model if isinstance(model, Slip) else None
 
 
 def _sensors(problem: Problem) -> list[int]:

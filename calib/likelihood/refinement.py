@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.errors import UnsolvableError
 from calib.likelihood.building import Start, built
 from calib.likelihood.descent import Descent, descend
 from calib.likelihood.held_out import HeldOut, held_out
@@ -32,12 +33,15 @@ from calib.likelihood.selection import selected
 from calib.likelihood.state import State
 from calib.likelihood.uncertainty import noise_variance, step_covariance
 from calib.observations import Observation
+from calib.screws import stood_still
 from calib.session import Intrinsics, Session
 
 Array = NDArray[np.float64]
 
 MOST_PASSES = 12
 SOFT_PASSES = 5
+LEAST_MOTION = 3.0
+"""How many times its standard deviation a joint's scale must be, all else being known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +103,7 @@ def refine(
     unknown = np.array([joint.reading_std is None for joint in session.joints], dtype=bool)
 
     def refit(problem: Problem, estimate: Estimate) -> Fit:
-        return _settled(problem, estimate, session.readings(), unknown)
+        return _settled(problem, estimate, session, unknown)
 
     found = selected(session, refit(*built(session, observations, start)), refit, target_warp)
     problem, weights, aside, descent = (
@@ -122,17 +126,19 @@ def refine(
     )
 
 
-def _settled(problem: Problem, estimate: Estimate, as_read: Array, unknown: NDArray[np.bool_]) -> Fit:
+def _settled(problem: Problem, estimate: Estimate, session: Session, unknown: NDArray[np.bool_]) -> Fit:
     """Return the fit from an estimate when neither noise nor outliers change any more.
 
-    `as_read` (n, m) are the readings, also of joints that should stand still; `unknown` (m,) tells the joints whose
-    readings' noise nobody said.
+    `unknown` (m,) tells the joints whose readings' noise nobody said. Raises UnsolvableError for a joint that does not
+    move the camera.
     """
+    names = [joint.name for joint in session.joints]
     problem, estimate, weights, aside = _approached(*resting(problem, estimate))
-    problem, estimate = as_the_views_follow(problem, estimate, weights, as_read)
+    problem, estimate = as_the_views_follow(problem, estimate, weights, session.readings())
     for _ in range(MOST_PASSES):
         problem, estimate = resting(problem, estimate)
         descent = descend(problem, estimate, weights)
+        _check_moved(names, problem, descent)
         estimate, known = descent.estimate, step_covariance(problem, descent, 1.0)
         problem, found, settled = seen_noise(problem, estimate, weights, known, unknown)
         weights, newly = judged(problem, found)
@@ -140,6 +146,13 @@ def _settled(problem: Problem, estimate: Estimate, as_read: Array, unknown: NDAr
             break
         aside = newly
     return Fit(problem, weights, aside, descent)
+
+
+def _check_moved(names: Sequence[str], problem: Problem, descent: Descent) -> None:
+    """Raise UnsolvableError where the views would hardly tell if a joint stood still, all else being known."""
+    for name, scale in zip(names, problem.layout.scales, strict=True):
+        if descent.equations.information[scale, scale] < LEAST_MOTION**2:
+            raise UnsolvableError(stood_still(name))
 
 
 def _approached(problem: Problem, estimate: Estimate) -> tuple[Problem, Estimate, Weights, SetAside]:

@@ -16,7 +16,13 @@ from scipy.stats import chi2
 
 from calib.errors import UnsolvableError
 from calib.likelihood.descent import count_measurements
-from calib.likelihood.imperfections import Circumstances, Imperfections, with_imperfections
+from calib.likelihood.imperfections import (
+    Circumstances,
+    Imperfections,
+    Slip,
+    possible_slips,
+    with_imperfections,
+)
 from calib.likelihood.measurements import PointViews
 from calib.likelihood.outliers import RARE, STUDENT, Given
 from calib.likelihood.problem import Estimate, Problem, Weights, all_in, evaluate
@@ -28,6 +34,9 @@ Refit = Callable[[Problem, Estimate], Fit]
 
 MOST_TRIES = 3
 MOST_ROUNDS = 12
+MOST_MOVES = 4
+LEAST_OF_A_SLIP = 49.0
+"""What a slip must gain: seven standard deviations, since what scatters views in groups might pass for less."""
 BELONGS = float(chi2.isf(RARE, 6))
 """The squared distance beyond which a view does not belong."""
 WORTH_TELLING = 0.02
@@ -56,7 +65,7 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
     has = Imperfections()
     for _ in range(MOST_ROUNDS):
         every = promised(fit, search.about, has)
-        price = _price(fit, len(every))
+        price = _price(fit, every)
         weakest = min(worths(fit, has), key=lambda kept: kept.gain - price(kept), default=None)
         if weakest is not None and weakest.gain <= price(weakest):
             less = search.back(fit, has, weakest.imperfections)
@@ -70,7 +79,7 @@ def selected(session: Session, fit: Fit, refit: Refit, target_warp: bool) -> Sel
         better = next((one for one in found if one is not None), None)
         if better is None:
             break
-        fit, has = better
+        fit, has = search.placed(*better)
     worth_telling = WORTH_TELLING * count_measurements(fit.problem, fit.weights)
     bulges = [c for c in every if c.imperfections.warp != has.warp and c.gain > max(price(c), worth_telling)]
     best = max(bulges, key=lambda c: c.gain - price(c), default=None)
@@ -97,18 +106,42 @@ class Search:
         None where nothing is better than before.
         """
         wanted = candidate.imperfections
-        problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted)
-        trial = self._fitted(replace(problem, reading_std=self.given, looseness=0.0), _as_read(estimate))
+        trial = self._with(fit, has, wanted)
         if trial is None:
             return None
         worth = [kept.gain for kept in worths(trial, wanted) if kept.imperfections == has]
-        if min([gained(fit, trial), *worth]) <= price:
+        # A fit that ended nowhere gains no number at all.
+        if not min([gained(fit, trial), *worth]) > price:
             return None
         # It may be the way there that gained: then it is open without the correction, too.
         plain = self.back(trial, wanted, has)
         if plain is None:
             return None
         return (trial, wanted) if gained(plain, trial) > price else (plain, has)
+
+    def placed(self, fit: Fit, has: Imperfections) -> tuple[Fit, Imperfections]:
+        """Return the fit with its last slip, if that is what came last, at the likeliest view near the one it `has`."""
+        for _ in range(MOST_MOVES):
+            last = has.models[-1] if has.models else None
+            if not isinstance(last, Slip):
+                break
+            others = has.models[:-1]
+            views = [s.view for s in possible_slips(fit.problem, others) if s.joint == last.joint]
+            place = views.index(last.view)
+            for view in views[max(place - 1, 0) : place] + views[place + 1 : place + 2]:
+                wanted = replace(has, models=(*others, replace(last, view=view)))
+                trial = self._with(fit, has, wanted)
+                if trial is not None and gained(fit, trial) > 0:
+                    fit, has = trial, wanted
+                    break
+            else:
+                break
+        return fit, has
+
+    def _with(self, fit: Fit, has: Imperfections, wanted: Imperfections) -> Fit | None:
+        """Return the fit with what is `wanted`, from where it is with nothing taken for scatter that was not said."""
+        problem, estimate = with_imperfections(fit.problem, fit.descent.estimate, self.about, has, wanted)
+        return self._fitted(replace(problem, reading_std=self.given, looseness=0.0), _as_read(estimate))
 
     def back(self, fit: Fit, has: Imperfections, wanted: Imperfections) -> Fit | None:
         """Return the fit with less than it `has`, from where it is; None where there is none."""
@@ -122,10 +155,16 @@ class Search:
             return None
 
 
-def _price(fit: Fit, candidates: int) -> Callable[[Candidate], float]:
-    """Return what a candidate must gain, as a function of it."""
+def _price(fit: Fit, every: list[Candidate]) -> Callable[[Candidate], float]:
+    """Return what a candidate must gain, as a function of it, having been chosen among `every` one of its sort."""
     measurements = count_measurements(fit.problem, fit.weights)
-    return lambda candidate: float(candidate.size * np.log(measurements) + 2 * np.log(max(candidates, 1)))
+    slips = sum(candidate.slip is not None for candidate in every)
+
+    def price(candidate: Candidate) -> float:
+        sort, least = (len(every) - slips, 0.0) if candidate.slip is None else (slips, LEAST_OF_A_SLIP)
+        return float(max(candidate.size * np.log(measurements) + 2 * np.log(max(sort, 1)), least))
+
+    return price
 
 
 def _promising(
@@ -135,14 +174,24 @@ def _promising(
 
     Of several errors, each that remains is scatter enough to hide the others: then they are tried together, too.
     """
-    enough = [c for c in candidates if c.gain > (HINT * c.size if scattered else price(c) / 2)]
-    best = sorted(enough, key=lambda c: price(c) - c.gain)[:MOST_TRIES]
+    # Of so many slips, one always promises a little of whatever scatters the views.
+    hints = [HINT * c.size if c.slip is None else 2 * HINT for c in candidates]
+    enough = [
+        c for c, hint in zip(candidates, hints, strict=True) if c.gain > (hint if scattered else price(c) / 2)
+    ]
+    best = _one_slip_a_joint(sorted(enough, key=lambda c: price(c) - c.gain))[:MOST_TRIES]
     joints = [c for c in best if len(c.imperfections.models) > len(has.models)]
     if not scattered or len(joints) < 2:
         return best
     models = tuple(c.imperfections.models[-1] for c in joints)
     together = replace(has, models=(*has.models, *models))
     return [*best, Candidate(together, sum(c.size for c in joints), sum(c.gain for c in joints))]
+
+
+def _one_slip_a_joint(candidates: list[Candidate]) -> list[Candidate]:
+    """Return the candidates without slips that come after another one of the same joint: that is the likelier view."""
+    joints = [None if c.slip is None else c.slip.joint for c in candidates]
+    return [c for i, c in enumerate(candidates) if c.slip is None or joints[i] not in joints[:i]]
 
 
 def _as_read(estimate: Estimate) -> Estimate:
@@ -182,6 +231,8 @@ def _deviance(problem: Problem, fit: Fit, weights: Weights) -> float:
         points = isinstance(group.data, PointViews)
         loose = 1 + problem.looseness if points else 1.0
         hessian, gradient = terms.blocks.hessian[:, :6, :6] / loose, terms.blocks.gradient[:, :6] / loose
+        # A view whose points were all set aside says nothing, and its zeros cannot be divided by.
+        hessian = hessian + (1e-13 * (np.trace(hessian, axis1=1, axis2=2) + 1))[:, None, None] * np.eye(6)
         away = (gradient * np.linalg.solve(hessian, gradient[..., None])[..., 0]).sum(axis=1)
         spread = terms.chain.by_reading * problem.reading_std
         transposed = np.swapaxes(spread, 1, 2)
