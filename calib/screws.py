@@ -127,14 +127,14 @@ def _turning_rate(poses: Array, readings: Array, sweeps: Ints, name: str, unit: 
         )
     turn = rotation_log(poses[second, :3, :3] @ np.swapaxes(poses[first, :3, :3], -1, -2))
     rate = robust_mean(turn / step[:, None], step**2, 2)
-    if np.abs(turn).max() > NOTHING:  # whole turns are another matter
-        _check_moved(turn, readings, first, second, sweeps, name)
     uneven = np.linalg.norm(turn - step[:, None] * rate, axis=1) > UNEVEN
     if uneven.mean() > MANY:
         raise UnsolvableError(
             f"the camera's turns between neighbouring views of joint '{name}' do not grow with its readings: "
             "these must be less than half a turn apart, so take views in between, or look for wrong readings"
         )
+    if np.abs(turn).max() > NOTHING:  # whole turns are another matter
+        _check_moved(turn, readings, first, second, sweeps, name)
     return rate
 
 

@@ -30,6 +30,8 @@ RIDGE = 1e-6  # of the diagonal
 CLIPPED_BLUR = (
     0.75  # px; sharper edges show too little of their shoulders to tell clipping from a bright paper
 )
+UNTOLD = 1.0  # px
+CLIPPED = 0.1  # of all pixels: noise brings few of them to one extreme value
 ROUNDING_VARIANCE = 1 / 12
 SURELY_BOWED = 1e-3  # px; that a lens' bend is known to at the best
 MEDIAN_SQUARE = 0.4549  # of a normal variable
@@ -84,7 +86,7 @@ def fit_tags(strips: Strips, courses: Floats | None, look: Floats) -> TagFit:
     camera clips, the drawing clips as well.
     """
     n, used, t = len(look), strips.used, strips.along
-    limits = _limits(strips) if np.exp(np.median(look[:, :2])) > CLIPPED_BLUR else (-np.inf, np.inf)
+    limits = _limits(strips, sharp=bool(np.exp(np.median(look[:, :2])) <= CLIPPED_BLUR))
     bow = 1 - t * t
     above_course = strips.heights
     if courses is not None:
@@ -107,19 +109,32 @@ def fit_tags(strips: Strips, courses: Floats | None, look: Floats) -> TagFit:
     covariances = scatter[:, None, None] * inverse
     if courses is not None:
         fitted, covariances = _bowed_alike(fitted, covariances)
+    # Clipped edges that show no slope at all may be anywhere in what was clipped.
+    untold = np.isfinite(limits).any() & (np.exp(fitted[:, BLURS]).min(axis=1) < 1.01 * LEAST_BLUR)
     return TagFit(
         heights=fitted[:, HEIGHTS] @ ENDS.T,
-        covariances=ENDS @ covariances[:, HEIGHTS, HEIGHTS] @ ENDS.T,
+        covariances=ENDS @ covariances[:, HEIGHTS, HEIGHTS] @ ENDS.T
+        + (untold * UNTOLD**2)[:, None, None] * np.eye(len(ENDS)),
         look=fitted[:, LOOK],
         scatter=scatter,
         unsettled=unsettled,
     )
 
 
-def _limits(strips: Strips) -> tuple[float, float]:
-    """Give the darkest and the brightest grey value: the camera may have clipped what is beyond."""
+def _limits(strips: Strips, sharp: bool) -> tuple[float, float]:
+    """Give the darkest and the brightest grey value: the camera may have clipped what is beyond.
+
+    Of a `sharp` picture they are given where many pixels have that very value, and -inf and inf where few do.
+    """
     values = strips.values[strips.used > 0]
-    return float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
+    darkest, brightest = float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
+    if not sharp:
+        return darkest, brightest
+    dark, bright = (values == darkest).sum(), (values == brightest).sum()
+    return (
+        darkest if dark > CLIPPED * len(values) else -np.inf,
+        brightest if bright > CLIPPED * len(values) else np.inf,
+    )
 
 
 def _linearised(

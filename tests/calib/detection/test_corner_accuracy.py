@@ -174,3 +174,17 @@ def test_a_view_is_bent_by_no_more_than_one_point_tells():
     points = np.stack(np.meshgrid(np.linspace(0, 0.2, 8), np.linspace(0, 0.15, 6)), axis=-1).reshape(-1, 2)
     bent = bent_view(view, points[:1], view.project(points[:1]) + 1, np.array([400.0, 300]))
     np.testing.assert_allclose(bent.project(points), view.project(points), atol=1.5)
+
+
+@pytest.mark.parametrize("target", KINDS)
+@pytest.mark.parametrize("gain", [1.3, 1.8, 3.0, 6.0, np.inf])
+def test_corners_of_saturated_pictures_are_as_good_as_they_claim(target, gain):
+    """Up to a picture of black and white alone: less is claimed where less is told."""
+    drawn = draw(target, size=(800, 600), tilt=(20, 10), noise=1)
+    bright = np.where(drawn.picture > 120, 255.0, 0.0) if gain == np.inf else drawn.picture * gain
+    found = detect(np.clip(bright, 0, 255).astype(np.uint8), target)
+    off = errors(drawn, found)
+    squares = (off * np.linalg.solve(found.covariances, off[..., None])[..., 0]).sum(axis=1) / 2
+    assert np.median(squares) < 4
+    if gain < 2:
+        assert np.sqrt(np.square(off).mean()) < 0.03
