@@ -1,13 +1,13 @@
 """A rig with play in one joint, another one that moves it along, and a plate that bulges: from pictures to poses."""
 
 import math
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from calib import load_session, solve, verify
+from calib import Calibration, load_session, solve, verify
+from calib.session import Session
 from daemon.profile import load_profile
 from daemon.service import Service, running_service
 from daemon.store import RunRecord, RunState
@@ -18,9 +18,24 @@ COUPLING = 0.02
 BULGE = 2e-3
 
 
-@pytest.fixture
-async def service(tmp_path: Path) -> AsyncIterator[Service]:
-    path = write_profile(tmp_path, positions=9)
+async def finished(service: Service) -> RunRecord:
+    run = await service.runs.wait((await service.runs.start()).id)
+    assert run.state is RunState.SUCCEEDED, run.error
+    return run
+
+
+async def test_what_is_imperfect_is_found_and_poses_take_it_into_account(tmp_path: Path) -> None:
+    async with running_service(load_profile(write_imperfect_rig(tmp_path)), tmp_path / "data") as service:
+        session = load_session(service.store.session_folder(await finished(service)))
+        assert len(session.views) == 9 + 17 + 2
+        calibration = solve(session, target_warp=True)
+        expect_what_is_imperfect(service, calibration, session)
+        expect_predictions(calibration, session)
+        await expect_poses_of_both_sides(service, calibration)
+
+
+def write_imperfect_rig(folder: Path) -> Path:
+    path = write_profile(folder, positions=9)
     text = path.read_text(encoding="utf-8")
     sweep = 'to = "12 deg"\npositions = 9\n'
     joint = "scale = 0.0174\n"
@@ -29,22 +44,10 @@ async def service(tmp_path: Path) -> AsyncIterator[Service]:
     text = text.replace(joint, f'{joint}backlash = "{PLAY} deg"\ncoupling = {{ slide = {COUPLING} }}\n')
     text += f'[simulation.plate]\nbulge = "{1e3 * BULGE} mm"\n'
     path.write_text(text, encoding="utf-8")
-    async with running_service(load_profile(path), tmp_path / "data") as service:
-        yield service
+    return path
 
 
-async def finished(service: Service) -> RunRecord:
-    run = await service.runs.wait((await service.runs.start()).id)
-    assert run.state is RunState.SUCCEEDED, run.error
-    return run
-
-
-async def test_what_is_imperfect_is_found_and_taken_into_account(service: Service) -> None:
-    run = await finished(service)
-    session = load_session(service.store.session_folder(run))
-    assert len(session.views) == 9 + 17 + 2
-    calibration = solve(session, target_warp=True)
-
+def expect_what_is_imperfect(service: Service, calibration: Calibration, session: Session) -> None:
     (play,) = calibration.corrections.backlash
     assert play.joint == "pan"
     assert play.half_gap_std is not None
@@ -61,8 +64,11 @@ async def test_what_is_imperfect_is_found_and_taken_into_account(service: Servic
     plate = service.rig.world.target_points()
     plane = np.column_stack([np.ones(len(plate)), plate[:, :2]])
     heights = plate[:, 2] - plane @ np.linalg.lstsq(plane, plate[:, 2], rcond=None)[0]
-    assert np.abs(calibration.points_of(session.target)[:, 2] - heights).max() < 0.2 * np.ptp(heights)
+    found = calibration.points_of(session.target)[:, 2]
+    assert np.abs(found - heights).max() < 0.2 * np.ptp(heights)
 
+
+def expect_predictions(calibration: Calibration, session: Session) -> None:
     verdict, flat = verify(calibration, session), verify(solve(session), session)
     assert verdict.rms_px is not None
     assert flat.rms_px is not None
@@ -70,9 +76,7 @@ async def test_what_is_imperfect_is_found_and_taken_into_account(service: Servic
     assert flat.rms_px > 1.5 * verdict.rms_px
 
 
-async def test_the_pose_follows_the_side_of_approach(service: Service) -> None:
-    run = await finished(service)
-    calibration = solve(load_session(service.store.session_folder(run)), target_warp=True)
+async def expect_poses_of_both_sides(service: Service, calibration: Calibration) -> None:
     service.poses.activate(service.poses.prepare("found", calibration))
     rig, apart = service.rig, []
     assert rig.world is not None
