@@ -34,8 +34,11 @@ CHANGES = (
     ('options = { power_up_position = "1 deg" }', ""),
     ('controller = "head"', 'controller = "stage"'),
     ('[controllers.head]\ndriver = "simulated"\n', ""),
+    ('acceleration = "400 mm/s2"', 'acceleration = "1500 mm/s2"'),
+    ('velocity = "40 deg/s"', 'velocity = "80 deg/s"'),
+    ('acceleration = "200 deg/s2"', 'acceleration = "800 deg/s2"'),
 )
-"""To the small rig, for both of its axes to be on one controller."""
+"""To the small rig, for both of its axes to be on one controller, and to be soon where they are disturbed."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ async def running(
 
 def write_small_rig(folder: Path, positions: int, reach: float) -> Path:
     """Write the small rig with both axes on one controller, whose motions last long enough to be disturbed."""
-    path = write_profile(folder, time_scale=1, velocity=200, positions=positions, reach=reach)
+    path = write_profile(folder, time_scale=1, velocity=300, positions=positions, reach=reach)
     text = path.read_text(encoding="utf-8")
     for old, new in CHANGES:
         assert old in text, old
