@@ -185,8 +185,10 @@ class Rig:
                     raise DeviceLostError(because(f"axis '{axis.spec.name}'", "cannot be read", axis.lost))
             if snapshot.timestamp is not None and snapshot.timestamp >= after:
                 return snapshot
-            for owner in self._controllers:
-                owner.poll_soon()
+            for axis in snapshot.axes:
+                # Those alone that are behind: the others would be read without a pause until a late one answers.
+                if axis.timestamp is None or axis.timestamp < after:
+                    self._owner_of[axis.spec.name].poll_soon()
             await self.changed.wait()
 
     async def past_readings(self, times: Sequence[datetime]) -> PastReadings:

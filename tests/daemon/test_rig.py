@@ -254,3 +254,13 @@ async def test_a_lost_camera_is_stated_and_found_again(rig: Rig, devices: Device
     await until(rig, lambda snapshot: snapshot.devices[-1].lost is None)
     frame = await rig.frame(after=rig.clock.now())
     assert frame.image.shape == (360, 480)
+
+
+async def test_axes_that_have_been_read_are_not_read_on_and_on_while_another_is_late(
+    rig: Rig, devices: Devices
+) -> None:
+    cast(SimulatedController, devices.controllers["head"]).inject("mute")
+    before = rig.axis("slide").number
+    with pytest.raises(DeviceLostError):
+        await rig.fresh_snapshot(rig.clock.now())
+    assert rig.axis("slide").number - before < 20
