@@ -19,6 +19,7 @@ class ClientMotions:
 
     def __init__(self, rig: Rig, leases: LeaseDesk) -> None:
         self._rig = rig
+        self._leases = leases
         self._under_way: dict[str, set[asyncio.Task[None]]] = {}
         self._beginning: set[str] = set()
         """Axes of motions whose first steps are still to be taken."""
@@ -29,11 +30,15 @@ class ClientMotions:
     ) -> asyncio.Task[None]:
         """Begin a motion of `axes` that is cancelled, and so stopped, when `lease` ends.
 
-        Returns when one of `axes` moves or the motion is over; raises what kept it from beginning.
+        Returns when one of `axes` moves or the motion is over; raises what kept it from beginning, and
+        LeaseEndedError or LeaseHeldError where the lease is over already.
         """
-        for name in self._beginning.intersection(axes):
+        try:
+            self._leases.require(lease.token)
+            self._require_none_beginning(axes)
+        except (DaemonError, DriverError):
             motion.close()
-            raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
+            raise
         with log_fields(axis=" ".join(axes)):
             task = asyncio.create_task(motion)
             task.add_done_callback(lambda done: self._finished(lease.token, done))
@@ -70,6 +75,10 @@ class ClientMotions:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _require_none_beginning(self, axes: Collection[str]) -> None:
+        for name in self._beginning.intersection(axes):
+            raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
 
     def _stop(self, lease: Lease) -> None:
         for task in self._under_way.get(lease.token, ()):

@@ -1,4 +1,8 @@
-"""What routes are given: the service behind the app, and the lease that a request shows."""
+"""What routes are given: the service behind the app, who asks, and the lease that a request shows.
+
+All of it is found on the event loop, where nothing comes between the finding and the route: FastAPI calls what is not
+`async` in a thread, and a lease could end on the way back.
+"""
 
 from typing import Annotated
 
@@ -9,7 +13,7 @@ from daemon.lease import Lease
 from daemon.service import Service
 
 
-def _service(request: Request) -> Service:
+async def _service(request: Request) -> Service:
     service: Service = request.app.state.service
     return service
 
@@ -17,7 +21,7 @@ def _service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(_service)]
 
 
-def _caller(request: Request) -> Caller | None:
+async def _caller(request: Request) -> Caller | None:
     caller: Caller | None = request.scope["caller"]
     return caller
 
@@ -30,7 +34,7 @@ LeaseToken = Annotated[
 ]
 
 
-def _lease(service: ServiceDep, token: LeaseToken = None) -> Lease:
+async def _lease(service: ServiceDep, token: LeaseToken = None) -> Lease:
     return service.leases.require(token)
 
 

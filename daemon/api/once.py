@@ -42,11 +42,11 @@ _Key = Annotated[
 ]
 
 
-def _once(_: _Key = None) -> None:
+async def _once(_: _Key = None) -> None:
     """Describe the header."""
 
 
-def _once_durably(_: _Key = None) -> None:
+async def _once_durably(_: _Key = None) -> None:
     """Describe the header."""
 
 

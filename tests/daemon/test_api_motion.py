@@ -8,6 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
+from daemon.errors import LeaseEndedError
 from daemon.profile import Profile
 from daemon.service import Service
 from tests.daemon.motions import home_all, until
@@ -50,6 +51,14 @@ async def test_nothing_moves_without_the_lease(
     assert code(refused) == (409, "lease_held")
     assert "'ben'" in refused.json()["detail"]
     assert service.rig.snapshot.readings == (0.0, 0.0)
+    assert not service.rig.snapshot.moving
+
+
+async def test_nothing_begins_under_a_lease_that_has_ended_meanwhile(service: Service) -> None:
+    lease = service.leases.acquire("anna", "", 60)
+    service.leases.release(lease.token)
+    with pytest.raises(LeaseEndedError):
+        await service.motions.begin(lease, ["pan"], service.rig.jog("pan", 1.0))
     assert not service.rig.snapshot.moving
 
 
