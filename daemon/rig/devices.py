@@ -25,9 +25,12 @@ class Devices:
     camera: CameraSource
 
 
-def make_devices(profile: Profile) -> Devices:
-    """Make the devices of `profile`. Raises OptionsError where a driver cannot do what the profile asks."""
-    context = _context(profile)
+def make_devices(profile: Profile, clock: Clock | None = None) -> Devices:
+    """Make the devices of `profile`, whose own clock they share unless `clock` is given.
+
+    Raises OptionsError where a driver cannot do what the profile asks.
+    """
+    context = _context(profile, clock)
     controllers = {}
     for name, controller in profile.controllers.items():
         axes = [axis for axis in profile.axes if axis.controller == name]
@@ -41,14 +44,14 @@ def make_devices(profile: Profile) -> Devices:
     return Devices(context.clock, context.world, controllers, camera)
 
 
-def _context(profile: Profile) -> DriverContext:
+def _context(profile: Profile, clock: Clock | None) -> DriverContext:
     if profile.simulation is None:
-        return DriverContext(SystemClock())
+        return DriverContext(clock or SystemClock())
     from drivers.simulated.world import SimulatedWorld
 
     scale = profile.simulation.time_scale
     # Drivers of real devices, which may be emulated elsewhere, stamp what they see by the system's clock.
-    clock = SystemClock() if scale == 1.0 else ScaledClock(scale)
+    clock = clock or (SystemClock() if scale == 1.0 else ScaledClock(scale))
     specs = [axis.spec for axis in profile.axes]
     target = profile.target.model_dump()
     return DriverContext(clock, SimulatedWorld(profile.simulation, specs, target, clock))

@@ -113,7 +113,7 @@ class SimulatedAxis(SupervisedAxis):
         self._hanging = fault == "hang"
         self._device_fault = None
         match fault:
-            case "lost" | "mute" | "alarm":
+            case "lost" | "mute" | "late" | "alarm":
                 self._device_fault = 0.5 * (now + motion.ends), fault
         self._shaft.drive(motion)
 

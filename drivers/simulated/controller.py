@@ -101,7 +101,7 @@ class SimulatedController:
                 if axis is None:
                     raise ValueError(f"'{fault}' is a fault of one axis: name it")
                 self._axes[axis].inject(fault)
-            case "lost" | "mute" | "alarm":
+            case "lost" | "mute" | "late" | "alarm":
                 self._device.fail(fault)
 
     def repair(self) -> None:

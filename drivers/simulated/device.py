@@ -41,7 +41,7 @@ class Device:
         self.fault = fault
         if fault == "lost":
             self._opened = False
-        if fault != "mute":
+        if fault in {"lost", "alarm"}:
             for react in self._reactions:
                 react()
 
@@ -58,6 +58,8 @@ class Device:
         """Wait for the device to answer on behalf of `axis`. Raises DeviceLostError when it does not."""
         if self.fault == "mute":
             await self.clock.sleep(self._answer_timeout)
+        if self.fault == "late":
+            await self.clock.sleep(0.9 * self._answer_timeout)
         if self.fault == "lost":
             raise DeviceLostError(
                 f"axis '{axis}': the simulated controller has gone: plug it in and open it again"

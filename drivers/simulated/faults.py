@@ -9,9 +9,9 @@ from drivers.driver import DriverOptions
 AxisFault = Literal["stall", "hang"]
 """`stall`: the next motion ends half way. `hang`: the next motion never reports its end."""
 
-DeviceFault = Literal["lost", "mute", "alarm"]
-"""`lost`: unplugged, without power. `mute`: there, but it answers nothing. `alarm`: it has forgotten where
-it is and refuses to move until it is homed or repaired."""
+DeviceFault = Literal["lost", "mute", "late", "alarm"]
+"""`lost`: unplugged, without power. `mute`: there, but it answers nothing. `late`: it answers when it is almost
+taken for lost. `alarm`: it has forgotten where it is and refuses to move until it is homed or repaired."""
 
 CameraFault = Literal["lost", "frozen", "late"]
 """`lost`: unplugged. `frozen`: no new frames. `late`: every frame is delivered long after its exposure."""

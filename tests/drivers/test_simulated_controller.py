@@ -139,6 +139,16 @@ async def test_a_mute_device_is_lost_after_its_time_out_and_comes_back() -> None
     await controller.close()
 
 
+async def test_a_late_device_answers_before_it_is_taken_for_lost() -> None:
+    controller = await homed(clock := VirtualClock(), answer_timeout="500 ms")
+    controller.inject("late")
+    began = clock.now()
+    assert (await controller.axes["slide"].read()).homed
+    assert 0.4 < clock.now() - began < 0.5
+    controller.repair()
+    await controller.close()
+
+
 async def test_an_unplugged_device_has_forgotten_where_it_is() -> None:
     controller = await homed(clock := VirtualClock())
     axis = controller.axes["slide"]

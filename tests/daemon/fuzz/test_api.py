@@ -1,14 +1,13 @@
 """Anything is asked of the API, by each role and by nobody: it answers as it describes, and those alone who may ask."""
 
 import json
-import os
 from collections.abc import Iterator
 from typing import Any, cast
 
 import pytest
 import requests
 import schemathesis
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from schemathesis import Case, GenerationMode
 from schemathesis.checks import not_a_server_error
@@ -27,6 +26,7 @@ from daemon.api import create_app
 from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT
 from daemon.service import Service
 from tests.daemon.access.keys import bearer
+from tests.daemon.fuzz.effort import effort
 from tests.daemon.fuzz.served import Served, served
 
 CHECKS = [
@@ -39,18 +39,11 @@ CHECKS = [
 NEEDED = {f"{method} {PREFIX}{path}": role for name, role in ROLES.items() for method, path in [name.split()]}
 NEEDED |= ROLES_AT_ROOT
 NOT_LET_IN = {"key_required", "key_unknown", "role_required"}
-EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "8"))
 PATIENCE = 30
 """Seconds in which an answer begins."""
 ENDLESS = ("/events", "/stream.mjpg")
 """What the addresses of streams end with."""
 
-ask_anything = settings(
-    max_examples=EXAMPLES,
-    deadline=None,
-    derandomize="FUZZ_EXAMPLES" not in os.environ,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-)
 askers = st.sampled_from([*Role, None])
 
 
@@ -102,7 +95,7 @@ def test_nothing_comes_of_what_somebody_may_not_ask(operation: APIOperation, rig
         return
     before = rig.state()
 
-    @settings(ask_anything, max_examples=EXAMPLES // 2)
+    @effort(4)
     @given(case=cases(operation), asker=st.sampled_from(refused))
     def ask(case: Case, asker: Role | None) -> None:
         status, code = asked(case, rig, asker)
@@ -115,7 +108,7 @@ def test_nothing_comes_of_what_somebody_may_not_ask(operation: APIOperation, rig
 
 @pytest.mark.parametrize("operation", operations(), ids=lambda operation: operation.label)
 def test_every_answer_is_as_described(operation: APIOperation, rig: Served) -> None:
-    @ask_anything
+    @effort(8)
     @given(case=cases(operation), asker=askers, holds_lease=st.booleans(), known=st.booleans())
     def ask(case: Case, asker: Role | None, holds_lease: bool, known: bool) -> None:
         lease = rig.service.leases.current
@@ -129,7 +122,7 @@ def test_every_answer_is_as_described(operation: APIOperation, rig: Served) -> N
     ask()
 
 
-@ask_anything
+@effort(8)
 @example(query={"rate": "0"}, asker=Role.VIEWER)
 @given(
     query=st.dictionaries(
