@@ -7,8 +7,9 @@ PEERS := .venv-peers
 PROFILE ?= paper-table
 DATA ?= activecam-data
 FUZZ_EXAMPLES ?= 300
+SOAK_MINUTES ?= 60
 
-.PHONY: demo test test-kernel test-kill test-fuzz lint format serve bench bench-peers figures clean
+.PHONY: demo test test-kernel test-kill test-fuzz soak lint format serve bench bench-peers figures clean
 
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
@@ -26,6 +27,9 @@ test-kill: $(VENV)/.installed-dev ## Daemons killed at 200 random moments of run
 
 test-fuzz: $(VENV)/.installed-dev ## Clients, devices and disks that do anything at any time, FUZZ_EXAMPLES times
 	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest --timeout 0 tests/daemon/fuzz
+
+soak: $(VENV)/.installed-dev ## Back-to-back runs with clients that come and go, for SOAK_MINUTES: what the daemon takes, and whether that grows
+	$(BIN)/python -m tests.daemon.soak $(SOAK_MINUTES)
 
 lint: $(VENV)/.installed-dev ## Style, types, and who imports whom
 	$(BIN)/ruff check .
