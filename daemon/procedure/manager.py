@@ -40,6 +40,8 @@ class RunManager:
         self._latest: Run | None = None
         self._starting = asyncio.Lock()
         self._closed = False
+        self._stops = 0
+        """How many times everything was stopped."""
         rig.latch.on_engage(self._stop)
 
     @property
@@ -150,6 +152,8 @@ class RunManager:
     async def close(self) -> None:
         """Start no more runs, interrupt the one under way, if any, and return when its axes stand."""
         self._closed = True
+        async with self._starting:  # one that is about to begin is to be ended, too
+            pass
         if self.active is not None:
             await self.active.end(
                 RunState.INTERRUPTED,
@@ -168,6 +172,7 @@ class RunManager:
     ) -> RunRecord:
         """Start a run, under a lease of its own where it moves, once `take_up` has stored that it is under way."""
         lease = self._leases.hand_over(f"run {record.id}", record.note, token) if assignment.moves else None
+        stops = self._stops
         try:
             log = await take_up()
         except BaseException:
@@ -179,6 +184,8 @@ class RunManager:
         running = replace(record, state=RunState.RUNNING, ended_at=None, error=None)
         self._latest = Run(running, assignment, log, self._store, self._end_of(lease))
         self._latest.start()
+        if self._stops > stops and assignment.moves:  # perhaps acknowledged by now
+            self._latest.break_off(RunState.FAILED, "a stop ended it while it began")
         return running
 
     async def _take_up(self, before: RunRecord) -> EventLog:
@@ -193,6 +200,7 @@ class RunManager:
         return log
 
     def _stop(self, reason: str) -> None:
+        self._stops += 1
         # Whatever it is doing: a run that only found out at its next motion would go on once the stop is
         # acknowledged.
         if self.active is not None and self.active.assignment.moves:

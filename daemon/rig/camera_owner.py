@@ -6,7 +6,7 @@ from typing import Any
 
 from daemon.rig.device_owner import DeviceOwner
 from drivers.camera import CameraSource, Frame, Watchful
-from drivers.errors import DeviceLostError, DeviceTimeoutError
+from drivers.errors import DeviceLostError, DeviceTimeoutError, DriverError
 
 
 class CameraOwner(DeviceOwner):
@@ -24,14 +24,15 @@ class CameraOwner(DeviceOwner):
     async def frame(self, after: float | None = None) -> Frame:
         """Return the newest frame exposed at or after `after` (rig's clock, s); see `CameraSource.frame`.
 
-        Raises DeviceLostError while the camera is away, DeviceTimeoutError when no such frame comes in time.
+        Raises DeviceLostError while the camera is away, DeviceTimeoutError when no such frame comes in time, and
+        DriverError for a frame from before, which might show the axes elsewhere.
         """
         if self.lost is not None or self._gone is None:
             raise DeviceLostError(self.lost or f"camera '{self.name}' is not connected")
         gone = self._gone
         try:
             async with asyncio.timeout(self._frame_timeout):
-                return await self._camera.frame(after)
+                frame = await self._camera.frame(after)
         except DeviceLostError as error:
             if not gone.done():
                 gone.set_exception(error)
@@ -43,6 +44,12 @@ class CameraOwner(DeviceOwner):
                 f"camera '{self.name}' gave no frame within {self._frame_timeout:g} s: "
                 "check its connection and its exposure time"
             ) from None
+        if after is not None and frame.timestamp < after:
+            raise DriverError(
+                f"camera '{self.name}' gave a frame {after - frame.timestamp:.3g} s older than was asked for, which "
+                "might show the axes elsewhere: its driver is wrong, as its contract suite will show"
+            )
+        return frame
 
     async def _open(self) -> None:
         await self._camera.open()

@@ -27,7 +27,8 @@ from daemon.procedure.events import Warned
 from daemon.profile import Profile
 from daemon.rig import Devices
 from daemon.service import Service, running_service
-from daemon.store import RunState
+from daemon.store import RunRecord, RunState
+from drivers.camera import Frame
 from drivers.simulated import SimulatedController
 from tests.daemon.motions import until
 from tests.daemon.rigs import small_rig
@@ -201,6 +202,53 @@ async def test_a_stop_right_after_the_start_ends_the_run(service: Service) -> No
     await service.rig.stop("somebody pressed the button")
     assert (await service.runs.wait(run.id)).error == "a stop ended it: somebody pressed the button"
     assert service.rig.snapshot.readings == (None, None)
+
+
+async def test_a_stop_while_the_start_is_stored_ends_the_run_even_if_it_is_acknowledged_at_once(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_run = service.store.add_run
+
+    async def stopped_meanwhile(run: RunRecord) -> None:
+        await add_run(run)
+        await service.rig.stop("somebody pressed the button")
+        service.rig.latch.acknowledge()
+
+    monkeypatch.setattr(service.store, "add_run", stopped_meanwhile)
+    run = await service.runs.start()
+    assert (await service.runs.wait(run.id)).error == "a stop ended it while it began"
+    assert service.rig.snapshot.readings == (None, None)
+
+
+async def test_a_shutdown_while_the_start_is_stored_interrupts_the_run(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_run, shutdowns = service.store.add_run, []
+
+    async def shut_down_meanwhile(run: RunRecord) -> None:
+        shutdowns.append(asyncio.create_task(service.halt()))
+        await asyncio.sleep(0)
+        await add_run(run)
+
+    monkeypatch.setattr(service.store, "add_run", shut_down_meanwhile)
+    run = await service.runs.start()
+    await shutdowns[0]
+    assert (await service.runs.get(run.id)).state is RunState.INTERRUPTED
+    assert service.rig.snapshot.readings == (None, None)
+
+
+async def test_a_camera_whose_driver_gives_old_frames_fails_the_run(
+    service: Service, devices: Devices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = devices.camera.frame
+
+    async def newest(after: float | None = None) -> Frame:
+        return await frame()
+
+    monkeypatch.setattr(devices.camera, "frame", newest)
+    run, _ = await finish(service, await service.runs.start())
+    assert run.state is RunState.FAILED
+    assert "older than was asked for" in (run.error or "")
 
 
 async def test_an_alarm_while_the_axes_stand_fails_the_run_in_its_words(
