@@ -5,8 +5,9 @@ verdict goes by views that were held out, by how sure the fit is of the poses th
 
     unknown   nothing was held out, and nothing is known to be wrong either
     poor      a prediction misses by more than 3 times as much as the fit; by more than a pixel and 10 times what the
-              noise of points and readings and the fit's own uncertainty explain; more than a fifth of the views was set
-              aside; something is not determined at all; a joint slipped
+              noise of points and readings and the fit's own uncertainty explain; by more than 5 pixels, whatever
+              explains it; more than a fifth of the views was set aside; something is not determined at all; a joint
+              slipped
     usable    more than 1.5 times, more than 3 times, more than a twentieth; something is badly known; fewer than 5
               views were held out; the session was cut off; nobody knows how sure the poses are
     good      none of this
@@ -27,6 +28,7 @@ Judgement = Literal["good", "usable", "poor", "unknown"]
 
 WORSE, MUCH_WORSE = 1.5, 3.0
 NOISIER, MUCH_NOISIER = 3.0, 10.0
+FAR = 5.0  # px
 SOME_ASIDE, MANY_ASIDE = 0.05, 0.2
 FEW_VIEWS = 5
 
@@ -67,6 +69,9 @@ def _faults(quality: Quality, weaknesses: Sequence[Weakness]) -> tuple[list[str]
             sentence = f"they are missed by {noisier:.2g} times what noise explains"
             much = noisier > MUCH_NOISIER * surely and quality.held_out_rms_px > 1
             (poor if much else doubts).append(sentence)
+    if quality.held_out_rms_px is not None and quality.held_out_rms_px > FAR:
+        # Noise of readings explains anything: what a slip that was not found looks like, too.
+        poor.append("readings tell the pose that badly: look for a joint that slips or is loose")
     fit = [view for view in quality.views if view.use == "fit"]
     aside = sum(view.set_aside for view in fit)
     if aside > SOME_ASIDE * len(fit):

@@ -149,9 +149,18 @@ def _settled(problem: Problem, estimate: Estimate, session: Session, unknown: ND
 
 
 def _check_moved(names: Sequence[str], problem: Problem, descent: Descent) -> None:
-    """Raise UnsolvableError where the views would hardly tell if a joint stood still, all else being known."""
+    """Raise UnsolvableError where the views would hardly tell if a joint stood still, all else being known.
+
+    Other than that are views that are all set aside: they tell nothing at all.
+    """
     for name, scale in zip(names, problem.layout.scales, strict=True):
-        if descent.equations.information[scale, scale] < LEAST_MOTION**2:
+        told = descent.equations.information[scale, scale]
+        if told == 0:
+            raise UnsolvableError(
+                f"all views in which joint '{name}' moved contradict the others, and would have to be set aside: it "
+                "may have slipped or been knocked; check its motor's current and acceleration, home it and run again"
+            )
+        if told < LEAST_MOTION**2:
             raise UnsolvableError(stood_still(name))
 
 

@@ -50,6 +50,11 @@ def aside(count: int) -> list[ViewQuality]:
         ({"rms_px": 0.05, "count": 2}, "usable", "only 2 views were held out"),
         ({"rms_px": 0.6, "held_out_rms_px": 0.7}, "usable", "7 times what noise explains"),
         ({"rms_px": 1.9, "held_out_rms_px": 2.0}, "poor", "20 times what noise explains"),
+        (
+            {"rms_px": 5.0, "predicted_px": 5.0, "held_out_rms_px": 5.1},
+            "poor",
+            "look for a joint that slips",
+        ),
         ({"predicted_px": 0.005, "held_out_rms_px": 0.1}, "usable", "20 times what noise explains"),
         ({"views": aside(1)}, "good", "predicted"),
         ({"views": aside(2)}, "usable", "2 of 20 views were set aside"),

@@ -22,13 +22,12 @@ from websockets.exceptions import InvalidStatus
 from calib import load_session
 from daemon.errors import ServeError
 from daemon.operation.supervisor import Supervisor
-from daemon.profile import Profile
-from daemon.rig import Devices
+from daemon.rig import make_devices
 from daemon.server import _until_end, address_of, bind, serving
 from daemon.service import Service, running_service
 from drivers.errors import MotionStoppedError
 from tests.daemon.motions import home_all, until
-from tests.daemon.rigs import write_profile
+from tests.daemon.rigs import small_rig, write_profile
 
 DAEMON = """
 import sys
@@ -206,8 +205,13 @@ async def test_clients_that_read_nothing_do_not_hold_up_the_end(
 
 
 async def test_an_error_in_the_program_ends_it_with_axes_that_stand(
-    profile: Profile, devices: Devices, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    profile = small_rig(
+        tmp_path, time_scale=5, velocity=10
+    )  # the motion lasts for seconds of the machine's time
+    devices = make_devices(profile)
+
     def fail(*_: object) -> None:
         raise ZeroDivisionError("a fault of ours")
 

@@ -1,14 +1,16 @@
 """A stepper table that fails in the course of a run: the run fails with a sentence, and nothing moves afterwards.
 
-Lost steps and a motor that stands are no faults here: the table counts what it sends, and cannot see them.
+Lost steps and a motor that stands are no faults here: the table counts what it sends, and cannot see them. The
+pictures can: the calibration is judged poor then, or there is none.
 """
 
 from pathlib import Path
 
 import pytest
 
+from daemon.store import RunState
 from drivers.emulators.grbl import GrblEmulator
-from tests.daemon.courses import Equipment, Faults, expect_failures
+from tests.daemon.courses import Equipment, Faults, expect_failures, running
 
 TABLE = Equipment(
     driver="grbl",
@@ -35,3 +37,14 @@ FAULTS: Faults = {
 @pytest.mark.parametrize("fault", FAULTS)
 async def test_a_fault_of_the_table_ends_the_run_with_a_sentence(fault: str, tmp_path: Path) -> None:
     await expect_failures(TABLE, FAULTS[fault], tmp_path)
+
+
+async def test_steps_that_the_table_loses_are_found_in_the_pictures(tmp_path: Path) -> None:
+    async with running(TABLE, tmp_path, positions=7, reach=15) as course:
+        await course.told("view", position=3)
+        course.emulator.slip("slide", 1)
+        run = await course.service.runs.wait(course.run.id)
+        assert (run.state, run.error) == (RunState.SUCCEEDED, None)
+        (summary,) = await course.service.store.calibrations()
+        assert summary.judgement == "poor"
+        assert "joint 'slide' slipped by -1.0" in str(summary.verdict)
