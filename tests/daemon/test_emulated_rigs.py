@@ -34,9 +34,12 @@ POSITION, ROTATION = 3e-4, 5e-4
 # larger ones smaller, but of a larger board; axes are faster and stand sooner; some views are left out.
 PATIENT = ("[procedure]", '[procedure]\nframe_timeout = "60 s"')
 FEWER_PICTURES = ('frame_rate = "10 Hz"', 'frame_rate = "5 Hz"')
+# The table's target is one of disks here: what ChArUco boards on it claim was exceeded in one run of several.
 CHANGES = {
     "grbl-table": (
         PATIENT,
+        ('kind = "charuco"\nrows = 6\ncolumns = 8\n', 'kind = "circle_grid"\nrows = 6\ncolumns = 7\n'),
+        ('marker = "23 mm"\ndictionary = "DICT_5X5_100"\n', 'disk_diameter = "18 mm"\n'),
         FEWER_PICTURES,
         ('velocity = "60 mm/s"', 'velocity = "300 mm/s"'),
         ('acceleration = "400 mm/s2"', 'acceleration = "3000 mm/s2"'),
