@@ -85,13 +85,20 @@ def list_drivers(kind: DriverKind) -> list[DriverInfo]:
 
 def _candidates(kind: DriverKind) -> dict[str, EntryPoint]:
     # A name of ours stays ours: a package that takes it too must not change what existing profiles mean.
-    group = f"activecam.{kind}"
-    found = {entry.name: entry for entry in entry_points(group=group)}
-    return found | {name: EntryPoint(name, target, group) for name, target in BUILT_IN[kind].items()}
+    return {entry.name: entry for entry in entry_points(group=_group(kind))} | _built_in(kind)
+
+
+def _built_in(kind: DriverKind) -> dict[str, EntryPoint]:
+    return {name: EntryPoint(name, target, _group(kind)) for name, target in BUILT_IN[kind].items()}
+
+
+def _group(kind: DriverKind) -> str:
+    return f"activecam.{kind}"
 
 
 def _load(kind: DriverKind, name: str) -> type[Any]:
-    candidates = _candidates(kind)
+    # To find a package's driver, the files of all that is installed are read.
+    candidates = _built_in(kind) if name in BUILT_IN[kind] else _candidates(kind)
     if name not in candidates:
         raise OptionsError(
             f"there is no driver '{name}' for {kind}: choose one of {', '.join(sorted(candidates))}, "
