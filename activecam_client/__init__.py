@@ -11,7 +11,18 @@ with Client("http://localhost:8080") as camera:
 """
 
 from activecam_client.client import Client
-from activecam_client.documents import Axis, Event, PastPose, Pose, Rays, Rig, RunRecord, Stop, StreamedPose
+from activecam_client.documents import (
+    Axis,
+    Event,
+    PastPose,
+    Pose,
+    Rays,
+    Rig,
+    RunRecord,
+    Stop,
+    StreamedPose,
+    View,
+)
 from activecam_client.errors import ActivecamError, ProblemError, UnreachableError
 from activecam_client.lease import Lease
 from activecam_client.run import Run
@@ -32,4 +43,5 @@ __all__ = [
     "Stop",
     "StreamedPose",
     "UnreachableError",
+    "View",
 ]

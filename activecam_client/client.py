@@ -16,6 +16,7 @@ from activecam_client.documents import (
     PoseAtReadings,
     Rays,
     Rig,
+    RunRecord,
     Stop,
     StreamedPose,
 )
@@ -129,6 +130,14 @@ class Client:
         headers = None if lease is None else lease.headers
         started = self._connection.ask("POST", "/runs", {"owner": owner, "note": note}, headers=headers)
         return Run(self._connection, started["id"])
+
+    def runs(self) -> list[RunRecord]:
+        """Return all runs, the newest first."""
+        return [RunRecord.model_validate(run) for run in self._connection.ask("GET", "/runs")]
+
+    def run_of(self, run_id: str) -> Run:
+        """Return a run that was started before, by its id: to follow it, to resume it, or to solve it anew."""
+        return Run(self._connection, run_id)
 
     def stop(self) -> Stop:
         """Stop everything at once, and return when all axes stand; nothing moves before it is acknowledged."""

@@ -121,6 +121,25 @@ class RunRecord(Document):
     calibration_id: str | None
 
 
+class View(Document):
+    """A view of a run.
+
+    `residual_px` (rms) is by how much its `points` miss where the calibration predicts them, `held_out_px` where the
+    fit of all other views does; None where that is not known.
+    """
+
+    number: int
+    joint: str | None
+    use: str
+    readings: list[float]
+    taken_at: datetime | None
+    points: int | None
+    residual_px: float | None
+    held_out_px: float | None
+    set_aside: bool
+    left_out: bool
+
+
 class Event(BaseModel):
     """Something that happened in a run; `type` says what, and which other fields there are."""
 

@@ -59,9 +59,13 @@ class Observed:
         return [observation for observation in self.observations if observation.view in views]
 
     def warnings(self, session: Session) -> list[str]:
-        """Return a sentence for each view of `session` that there is something to be said of."""
+        """Return a sentence for each view of `session` that is used and that there is something to be said of."""
         said = sorted([*self.unseen.items(), *self.remarks.items()])
-        return [f"view {view} ({session.views[view].image}): {sentence}" for view, sentence in said]
+        return [
+            f"view {view} ({session.views[view].image}): {sentence}"
+            for view, sentence in said
+            if session.views[view].use != "none"
+        ]
 
 
 def observe(

@@ -4,7 +4,7 @@
 readings, which are in each joint's own reading unit. Unknown keys are kept.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, Self
 
@@ -196,7 +196,7 @@ class View(Document):
     points: Points | None = None
     world_from_camera: RigidRows | None = None
     camera: str | None = None
-    use: Literal["fit", "verify"] = "fit"
+    use: Literal["fit", "verify", "none"] = "fit"
     approached: list[Literal[-1, 0, 1]] | None = None
     sweep: Annotated[int, Field(ge=0)] | None = None
     """Which sweep of a run's procedure took it, from 0; its free views count as the last."""
@@ -304,6 +304,21 @@ class Session(Document):
         changed = self.model_copy(update={"views": views})
         changed._folder = self._folder
         return changed
+
+    def leaving_out(self, places: Collection[int]) -> Self:
+        """Return this session with the views at these places not used; raises FormatError for one that there is not."""
+        for place in places:
+            if not 0 <= place < len(self.views):
+                raise FormatError(
+                    f"there is no view {place}: the session has {len(self.views)}, counted from 0"
+                )
+        unused = set(places)
+        return self.with_views(
+            [
+                view.model_copy(update={"use": "none"}) if place in unused else view
+                for place, view in enumerate(self.views)
+            ]
+        )
 
     def holding(self, held: Mapping[str, Held | None]) -> Self:
         """Return this session with more parameters held; raises FormatError for one that there is not."""

@@ -35,14 +35,15 @@ def solve(
     """Calibrate the active camera of `session`: chain, camera on it, base and lens, with no initial guess.
 
     `ml` is the maximum-likelihood fit with its uncertainty, `closed_form` the paper's method, from which it starts.
-    `progress` is told what is being done. Views marked `verify` are held out; they only enter the quality. A
-    session that was cut off (`complete` is false) is solved as far as it goes, for the joints that were
-    exercised. `hold` are parameters to be kept at a value, by name, beside those that the session holds
-    (`calib.parameters`). With `target_warp` the fit lets the target bulge, if the data support it. Raises
-    FormatError for a parameter that there is not, UnsolvableError, which names the joint or view and what
+    `progress` is told what is being done. Views marked `verify` are held out; they only enter the quality, and those
+    marked `none` nothing but their own line in it. A session that was cut off (`complete` is false) is solved as far
+    as it goes, for the joints that were exercised. `hold` are parameters to be kept at a value, by name, beside those
+    that the session holds (`calib.parameters`). With `target_warp` the fit lets the target bulge, if the data support
+    it. Raises FormatError for a parameter that there is not, UnsolvableError, which names the joint or view and what
     would help, and ImageError for a missing picture.
     """
-    session, cut_off = finished_part(session.holding(hold or {}))
+    part = finished_part(session.holding(hold or {}))
+    session = part.session
     observed = second_look(
         session,
         observe(session, progress),
@@ -61,7 +62,7 @@ def solve(
     fitted = method == "ml" and bool(session.joints)
     if fitted:
         solution = most_likely(session, fit, solution, target_warp)
-    warnings = [] if cut_off is None else [cut_off]
+    warnings = [] if part.sentence is None else [part.sentence]
     warnings += undecided_in_words(solution.undecided, session.target.kind)
     units = {joint.name: joint.reading_unit for joint in session.joints}
     warnings += [weakness_in_words(weakness, units) for weakness in solution.weaknesses]
@@ -80,7 +81,8 @@ def solve(
     corrected = corrections_in_words(calibration.corrections, session.joints, points)
     if target_warp and not solution.warp:
         corrected.append(FLAT)
-    quality = quality.model_copy(update={"corrections": corrected})
+    views = [view.model_copy(update={"view": part.places[view.view]}) for view in quality.views]
+    quality = quality.model_copy(update={"corrections": corrected, "views": views})
     return calibration.model_copy(update={"quality": quality})
 
 

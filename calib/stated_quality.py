@@ -12,7 +12,7 @@ class ViewQuality(Document):
 
     view: int
     joint: str | None
-    use: Literal["fit", "verify"]
+    use: Literal["fit", "verify", "none"]
     rms_px: Number | None = None
     position_m: Number | None = None
     rotation_rad: Number | None = None

@@ -1,6 +1,7 @@
 """What can be solved of a session that was cut off: the joints whose sweeps were begun well enough."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +15,30 @@ from calib.sweeps import SAME_START, reading_spans, sweep_labels
 Mask = NDArray[np.bool_]
 
 
-def finished_part(session: Session) -> tuple[Session, str | None]:
-    """Return `session` without the joints that were not exercised yet, and a sentence about them, or None.
+@dataclass(frozen=True, eq=False)
+class FinishedPart:
+    """What can be solved of a session: `places` are those of its views in the whole; a sentence on what is missing."""
+
+    session: Session
+    places: Sequence[int]
+    sentence: str | None
+
+
+def finished_part(session: Session) -> FinishedPart:
+    """Return `session` without the joints that were not exercised yet.
 
     A joint left out stands still in what remains: of the views only those from before it moved are kept.
     Raises UnsolvableError where no joint has been exercised.
     """
+    everywhere = range(len(session.views))
     if session.complete or not session.joints or not session.views:
-        return session, None
+        return FinishedPart(session, everywhere, None)
     labels = _labels(session)
     done: Mask = np.asarray((labels >= 0).any(axis=0))
     if done.all():
-        return (
+        return FinishedPart(
             session,
+            everywhere,
             f"the session was cut off after {len(session.views)} views: its joints are known less well",
         )
     if not done.any():
@@ -41,7 +53,8 @@ def finished_part(session: Session) -> tuple[Session, str | None]:
         f"joint '{joint.name}' was not exercised and counts as fixed at {reading:g} {joint.reading_unit}"
         for joint, reading in zip(left_out, rest[~done], strict=True)
     )
-    return _where_others_stand(session, done, rest)[0], sentence
+    part, kept = _where_others_stand(session, done, rest)
+    return FinishedPart(part, np.flatnonzero(kept).tolist(), sentence)
 
 
 def part_about(session: Session, readings: Sequence[float]) -> tuple[Session, list[int], list[float]]:

@@ -50,7 +50,16 @@ def judgement_and_verdict(
     if not complete:
         doubts.append("the session was cut off")
     judgement: Judgement = "poor" if poor else "usable" if doubts else "good"
-    return judgement, f"{judgement.capitalize()}: {'; '.join([*_figures(quality), *poor, *doubts])}"
+    return (
+        judgement,
+        f"{judgement.capitalize()}: {'; '.join([*_figures(quality), *_dropped(quality), *poor, *doubts])}",
+    )
+
+
+def _dropped(quality: Quality) -> list[str]:
+    """Return what a person has left out, which says nothing against the calibration by itself."""
+    dropped = sum(view.use == "none" for view in quality.views)
+    return [f"{dropped} view{'s' if dropped > 1 else ''} left out by hand"] if dropped else []
 
 
 def _faults(quality: Quality, weaknesses: Sequence[Weakness]) -> tuple[list[str], list[str]]:

@@ -95,14 +95,15 @@ class Verification:
 
 
 def verify(calibration: Calibration, session: Session, progress: Progress | None = None) -> Verification:
-    """Judge `calibration` on the views of `session`: those marked `verify`, or all where none is.
+    """Judge `calibration` on the views of `session`: those marked `verify`, or all that are used where none is.
 
     Raises FormatError where the session's joints or cameras are not the calibration's, UnsolvableError
     where the target is never seen, ImageError for a missing picture.
     """
     _require_same_rig(calibration, session)
     marked = any(view.use == "verify" for view in session.views)
-    judged = [index for index, view in enumerate(session.views) if view.use == "verify" or not marked]
+    use = "verify" if marked else "fit"
+    judged = [index for index, view in enumerate(session.views) if view.use == use]
 
     def predict(_: Sequence[Observation], view: View) -> Prediction:
         camera = session.cameras[session.camera_index(view)].name

@@ -16,6 +16,8 @@
     │   ├── RunActiveError                     one run at a time, and one is under way
     │   ├── RunStateError                      the run is not in a state in which this can be asked
     │   ├── ProfileChangedError                the run was taken with another profile than the rig's
+    │   ├── SessionUnreadableError             what the run has measured is gone or damaged
+    │   ├── UnknownViewError (KeyError)        no view of this number
     │   └── TargetUnseenError                  the views that a run got are too few to go on
     ├── PoseError
     │   ├── NotCalibratedError                 no calibration is active
@@ -119,6 +121,14 @@ class RunStateError(RunError):
 
 class ProfileChangedError(RunError):
     """A run cannot be resumed with another profile than it was begun with."""
+
+
+class SessionUnreadableError(RunError):
+    """What a run has measured is not on disk any more, or damaged."""
+
+
+class UnknownViewError(RunError, KeyError):
+    """A run has no view of this number."""
 
 
 class TargetUnseenError(RunError):

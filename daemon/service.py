@@ -14,6 +14,7 @@ from daemon.access.access import Access, running_access
 from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError, StoreError
 from daemon.idempotency import AnswersGiven
+from daemon.judging import Judge
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
@@ -45,6 +46,7 @@ class Service:
         self.fallback: Fallback | None = None
         """What the active calibration was found to lack, until another is activated."""
         self.runs = RunManager(rig, self.leases, store, self._use, self.figures.told)
+        self.judge = Judge(store, self.runs)
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
         self.streams = Streams()

@@ -21,6 +21,7 @@ from daemon.api import (
     rig,
     runs,
     session,
+    views,
 )
 from daemon.api.gate import Gate
 from daemon.api.guard import Guard
@@ -29,7 +30,7 @@ from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
 from daemon.service import Service
 
-API_VERSION: Final = "1.0.0"
+API_VERSION: Final = "1.1.0"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
@@ -79,7 +80,20 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
     )
     app.state.service = service
     # Routes are tried in this order, so that the pose, which is asked most, comes first.
-    for part in (poses, pose_stream, health, rig, lease, axes, camera, runs, calibrations, session, audit):
+    for part in (
+        poses,
+        pose_stream,
+        health,
+        rig,
+        lease,
+        axes,
+        camera,
+        runs,
+        views,
+        calibrations,
+        session,
+        audit,
+    ):
         app.include_router(part.router, prefix=PREFIX)
     app.include_router(metrics.router)
     app.include_router(reference.router)

@@ -62,6 +62,8 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
     daemon.StaleReadingError: Kind(503, "reading_stale", "The latest reading is too old"),
     daemon.LensUnknownError: Kind(409, "lens_unknown", "The camera's lens is not known"),
     daemon.UnknownCameraError: Kind(404, "unknown_camera", "There is no such camera"),
+    daemon.UnknownViewError: Kind(404, "unknown_view", "The run has no such view"),
+    daemon.SessionUnreadableError: Kind(409, "session_unreadable", "The run's views cannot be read"),
     daemon.UnknownCalibrationError: Kind(404, "unknown_calibration", "There is no such calibration"),
     daemon.IdempotencyConflictError: Kind(422, "idempotency_conflict", "The key was another request's"),
     daemon.IdempotencyInProgressError: Kind(

@@ -40,6 +40,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "POST /runs": OPERATOR,
     "GET /runs/{run_id}": VIEWER,
     "GET /runs/{run_id}/events": VIEWER,
+    "GET /runs/{run_id}/views": VIEWER,
+    "GET /runs/{run_id}/views/{number}/image.jpg": VIEWER,
     "POST /runs/{run_id}/pause": OPERATOR,
     "POST /runs/{run_id}/resume": OPERATOR,
     "POST /runs/{run_id}/solve": OPERATOR,

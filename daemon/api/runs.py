@@ -18,9 +18,11 @@ from daemon.errors import (
     RigFaultError,
     RunActiveError,
     RunStateError,
+    SessionUnreadableError,
     StopLatchedError,
     StoreError,
     UnknownRunError,
+    UnknownViewError,
 )
 from daemon.procedure import RunEvent
 from daemon.store import RunRecord, RunState
@@ -35,6 +37,17 @@ class RunRequest(RequestBody):
 
     owner: Annotated[str, Field(max_length=200)] = ""
     note: Annotated[str, Field(max_length=1000)] = ""
+
+
+ViewNumber = Annotated[int, Field(ge=0)]
+
+
+class SolveRequest(RequestBody):
+    """What to solve a run's views without."""
+
+    leave_out: Annotated[
+        list[ViewNumber], Field(max_length=10_000, description="Views that are not used, by their numbers.")
+    ] = []  # noqa: RUF012  pydantic copies it
 
 
 class RunDocument(BaseModel):
@@ -152,15 +165,25 @@ async def resume_run(run_id: RunId, service: ServiceDep, token: LeaseToken = Non
     "/{run_id}/solve",
     status_code=202,
     summary="Solve what a run has measured",
-    responses=answers(UnknownRunError, RunActiveError, RunStateError, StoreError, *KEYED),
+    responses=answers(
+        UnknownRunError,
+        UnknownViewError,
+        SessionUnreadableError,
+        RunActiveError,
+        RunStateError,
+        StoreError,
+        *KEYED,
+    ),
     dependencies=[ONCE_DURABLY],
 )
-async def solve_run(run_id: RunId, service: ServiceDep) -> RunDocument:
-    """Solve the views of a run that was interrupted, failed or cancelled, as far as they go.
+async def solve_run(
+    run_id: RunId, service: ServiceDep, request: Annotated[SolveRequest | None, Body()] = None
+) -> RunDocument:
+    """Solve the views of a run that is over, as far as they go, or all but some of them.
 
     Nothing moves. The run keeps its state; `calibration_id` is what was found, which is stored and not activated.
     """
-    return RunDocument.of(await service.runs.solve(run_id))
+    return RunDocument.of(await service.runs.solve(run_id, (request or SolveRequest()).leave_out))
 
 
 @router.post(

@@ -6,6 +6,7 @@ In the order in which a run goes:
     run           its states, from its start to its last word;  gate  where it waits while paused
     assignment    what it has to do: measure and solve, or solve what there is
     survey        homing, sweeps and free views;  observation  one view
+    measured      what is on disk of it, read back
     conclusion    solving and verification;  worker  a thread for them that can be abandoned
     events        what it tells;  event_log  told in order, kept, followed;  event_file  their lines on disk
 """

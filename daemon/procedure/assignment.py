@@ -1,7 +1,7 @@
 """What a run is to do: measure and solve, or solve what an earlier run has measured."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from drivers.cancellation import finish
 Checkpoint = Callable[[], Awaitable[None]]
 End = tuple[RunState, str | None]
 
-UNSOLVED = "; its views could not be solved: "
+UNSOLVED = "its views could not be solved: "
 
 
 class Assignment(Protocol):
@@ -26,6 +26,10 @@ class Assignment(Protocol):
     @property
     def moves(self) -> bool:
         """Whether it moves axes: under a lease of its own, and ended by a stop."""
+
+    @property
+    def activates(self) -> bool:
+        """Whether poses are computed from what it finds, unless somebody decides otherwise."""
 
     async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:
         """Do it; raises errors of the project's trees and OSError."""
@@ -41,6 +45,7 @@ class Calibrate:
     """Take the views that the session in `folder` lacks, and solve it; its calibration is to be used."""
 
     moves = True
+    activates = True
 
     def __init__(self, rig: Rig, folder: Path) -> None:
         self._rig = rig
@@ -71,23 +76,26 @@ class Calibrate:
 
 
 class Solve:
-    """Solve the session in `folder` as it is. The run ended before its time, and that stays so."""
+    """Solve the session in `folder` as it is, but for the views `left_out`. The run stays what it was."""
 
     moves = False
+    activates = False
 
-    def __init__(self, before: RunRecord, folder: Path) -> None:
+    def __init__(self, before: RunRecord, folder: Path, left_out: Sequence[int] = ()) -> None:
         self._before = before
         self._folder = folder
+        self._left_out = left_out
 
     async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:  # noqa: ARG002
         """Solve."""
         log.add(StateChanged(state=RunState.RUNNING))
-        return await conclude(self._folder, log)
+        return await conclude(self._folder, log, self._left_out)
 
     async def halt(self) -> None:
         """Leave the axes to whoever moves them."""
 
     def end(self, state: RunState, error: str | None) -> End:
         """End as the run did before."""
-        why = (self._before.error or "").partition(UNSOLVED)[0]
-        return self._before.state, why if state is RunState.SUCCEEDED else f"{why}{UNSOLVED}{error}"
+        before = (self._before.error or "").partition(UNSOLVED)[0].removesuffix("; ")
+        unsolved = "" if state is RunState.SUCCEEDED else f"{UNSOLVED}{error}"
+        return self._before.state, "; ".join(filter(None, (before, unsolved))) or None

@@ -3,7 +3,7 @@
 import asyncio
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,8 @@ class Conclusion:
         return None if self.verification is None else json.dumps(self.verification, allow_nan=False)
 
 
-async def conclude(folder: Path, log: EventLog) -> Conclusion:
-    """Solve the session in `folder` and verify the result, in a worker thread.
+async def conclude(folder: Path, log: EventLog, left_out: Sequence[int] = ()) -> Conclusion:
+    """Solve the session in `folder`, but for the views `left_out`, and verify the result, in a worker thread.
 
     Raises CalibError in a sentence. A solver that is abandoned by a cancellation ends with its next message.
     """
@@ -41,12 +41,12 @@ async def conclude(folder: Path, log: EventLog) -> Conclusion:
         loop.call_soon_threadsafe(log.add, Solving(message=message))
 
     try:
-        calibration = await in_worker(lambda: _solve(folder, tell))
+        calibration = await in_worker(lambda: _solve(folder, left_out, tell))
     finally:
         abandoned.set()
     quality = calibration.quality.model_dump(mode="json", exclude={"views"})
     log.add(Solved(method=calibration.method, quality=quality))
-    verification = await in_worker(lambda: _verify(calibration, folder))
+    verification = await in_worker(lambda: _verify(calibration, folder, left_out))
     if verification is not None:
         log.add(Verified(result=verification))
     return Conclusion(calibration, verification)
@@ -56,21 +56,21 @@ class _Abandoned(Exception):  # noqa: N818  it is no error
     """Ends a solver whose result nobody waits for."""
 
 
-def _solve(folder: Path, tell: Callable[[str], None]) -> Calibration:
+def _solve(folder: Path, left_out: Sequence[int], tell: Callable[[str], None]) -> Calibration:
     from calib import solve  # it brings scipy, which a daemon that only serves poses does without
 
     session = load_session(folder)
-    calibration = solve(session, progress=tell)
+    calibration = solve(session.leaving_out(left_out), progress=tell)
     if _of_all_joints(calibration, session):
         keep_origin(session, calibration.origin)
     return calibration
 
 
-def _verify(calibration: Calibration, folder: Path) -> dict[str, Any] | None:
+def _verify(calibration: Calibration, folder: Path, left_out: Sequence[int]) -> dict[str, Any] | None:
     from calib import verify
 
-    session = load_session(folder)
-    if all(view.use == "fit" for view in session.views):
+    session = load_session(folder).leaving_out(left_out)
+    if not any(view.use == "verify" for view in session.views):
         return None  # views of the fit would flatter it
     if not _of_all_joints(calibration, session):
         return None  # it cannot tell where the camera was

@@ -41,6 +41,11 @@ class EventLog:
         write_durably(folder / FILE_NAME, lines.encode())
         return cls(run.id, folder, earlier)
 
+    @property
+    def events(self) -> Sequence[RunEvent]:
+        """All events so far."""
+        return tuple(self._events)
+
     def listen(self, listener: Told) -> None:
         """Call `listener` with each event from now on."""
         self._listener = listener

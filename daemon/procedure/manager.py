@@ -13,6 +13,7 @@ from daemon.procedure.assignment import Assignment, Calibrate, Solve
 from daemon.procedure.beginning import new_record, require_same_profile
 from daemon.procedure.event_log import EventLog, Told, past_events
 from daemon.procedure.events import RunEvent
+from daemon.procedure.measured import require_views
 from daemon.procedure.run import Run
 from daemon.rig import Rig
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
@@ -86,16 +87,20 @@ class RunManager:
             assignment = Calibrate(self._rig, self._store.session_folder(before))
             return await self._begin(before, assignment, lambda: self._take_up(before), token)
 
-    async def solve(self, run_id: str) -> RunRecord:
-        """Solve what a run has measured that ended before its time; its calibration is stored and not activated.
+    async def solve(self, run_id: str, left_out: Sequence[int] = ()) -> RunRecord:
+        """Solve what a run that is over has measured, but for the views `left_out`.
 
-        Raises UnknownRunError, RunActiveError, RunStateError and StoreError.
+        The run stays what it was, and its calibration is stored and not activated. Raises UnknownRunError,
+        UnknownViewError, SessionUnreadableError, RunActiveError, RunStateError and StoreError.
         """
         async with self._starting:
             await self.settle()
-            before = await self._require_unfinished(run_id)
+            before = await self.get(run_id)
             self._require_free()
-            assignment = Solve(before, self._store.session_folder(before))
+            folder = self._store.session_folder(before)
+            if left_out:
+                await asyncio.to_thread(require_views, before, folder, left_out)
+            assignment = Solve(before, folder, left_out)
             return await self._begin(before, assignment, lambda: self._take_up(before))
 
     async def settle(self) -> None:
@@ -129,6 +134,13 @@ class RunManager:
             return self._latest.record
         return await self._store.run(run_id)
 
+    async def told(self, run_id: str) -> Sequence[RunEvent]:
+        """Return a run's events so far; raises UnknownRunError."""
+        if self._latest is not None and self._latest.record.id == run_id:
+            return self._latest.log.events
+        record = await self._store.run(run_id)
+        return await asyncio.to_thread(past_events, record, self._store.session_folder(record))
+
     async def list(self) -> Sequence[RunRecord]:
         """Return all runs, the newest first."""
         # The store may not have taken the latest's end, which only its own record tells then.
@@ -144,8 +156,7 @@ class RunManager:
             async for event in self._latest.log.follow(after):
                 yield event
             return
-        record = await self._store.run(run_id)
-        for event in await asyncio.to_thread(past_events, record, self._store.session_folder(record)):
+        for event in await self.told(run_id):
             if event.sequence > after:
                 yield event
 
@@ -196,7 +207,8 @@ class RunManager:
             log = await asyncio.to_thread(EventLog.reopen, before, folder, told)
         except OSError as error:
             raise StoreError(f"{folder}: the run's events cannot be written: {error.strerror}") from error
-        await self._store.change_run(before.id, RunState.RUNNING)
+        if before.state is not RunState.SUCCEEDED:  # which one that is solved again remains, whatever comes
+            await self._store.change_run(before.id, RunState.RUNNING)
         return log
 
     def _stop(self, reason: str) -> None:

@@ -163,7 +163,8 @@ class Run:
     async def _keep(self, conclusion: Conclusion, state: RunState) -> CalibrationRecord:
         """Write the calibration beside its session, and return the record that goes into the store.
 
-        It is to be used where the run has succeeded; one of a run that was cut off is for a person to judge.
+        It is to be used where the run has succeeded; one of a run that was cut off, or of other views than a run
+        was planned with, is for a person to judge.
         """
         calibration = conclusion.calibration
         await asyncio.to_thread(write_json, self.folder / "calibration.json", calibration)
@@ -171,7 +172,7 @@ class Run:
             id=uuid4().hex,
             created_at=datetime.now(UTC),
             method=calibration.method,
-            active=state is RunState.SUCCEEDED,
+            active=state is RunState.SUCCEEDED and self.assignment.activates,
             run_id=self.record.id,
             document=calibration.model_dump_json(exclude_unset=True),
             verification=conclusion.verification_json(),

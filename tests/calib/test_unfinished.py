@@ -31,9 +31,9 @@ def test_the_finished_joint_is_solved(count: int) -> None:
 def test_the_sides_of_the_joints_that_remain_are_kept() -> None:
     session = cut_off(6)
     views = [view.model_copy(update={"approached": [1, -1]}) for view in session.views]
-    kept, _ = finished_part(session.with_views(views))
+    kept = finished_part(session.with_views(views)).session
     assert [view.approached for view in kept.views] == [[1]] * 6
-    assert [view.approached for view in finished_part(session)[0].views] == [None] * 6
+    assert [view.approached for view in finished_part(session).session.views] == [None] * 6
 
 
 def test_all_joints_once_they_are_begun() -> None:
@@ -96,10 +96,10 @@ def test_readings_of_joints_that_stand_still_jitter(count: int) -> None:
         view.model_copy(update={"world_from_camera": pose})
         for view, pose in zip(session.views, poses, strict=False)
     ]
-    part, sentence = finished_part(session.with_views(placed))
+    part = finished_part(session.with_views(placed))
     begun = 1 + (count - 2) // 7
-    assert [joint.name for joint in part.joints] == ["j0", "j1", "j2"][:begun]
-    assert sentence is not None
+    assert [joint.name for joint in part.session.joints] == ["j0", "j1", "j2"][:begun]
+    assert part.sentence is not None
     calibration = solve(session.with_views(placed))
     moved = {0: slice(0, 7), 1: slice(7, 14), 2: slice(14, 21)}[begun - 1]
     kept = [at for _, at, _ in views[moved]][: count - 7 * (begun - 1)]

@@ -136,6 +136,28 @@ async def test_a_run_takes_the_lease_over_and_tells_its_events(client: Client, s
     assert {"plan", "view", "solved", "finished"} < set(kinds)
 
 
+async def test_a_run_is_cut_off_resumed_and_solved_without_a_view(client: Client, service: Service) -> None:
+    def calibrate() -> None:
+        started = client.run("anna")
+        next(event for event in started.events() if event.type == "view" and event.view == 4)
+        assert started.cancel().state == "cancelled"
+        assert [record.id for record in client.runs()] == [started.id]
+        run = client.run_of(started.id)
+        assert 4 < len(run.views()) < 10
+        with client.lease("anna") as lease:
+            assert run.resume(lease).state == "running"
+        first = run.wait()
+        assert first.state == "succeeded"
+        assert run.solve([2]).state == "running"
+        second = run.wait()
+        assert (second.state, second.calibration_id == first.calibration_id) == ("succeeded", False)
+        assert [view.number for view in run.views() if view.left_out] == [2]
+        assert not any(view.left_out for view in run.views(first.calibration_id))
+        assert client.rig().calibration_id == first.calibration_id
+
+    await aside(calibrate)
+
+
 async def test_a_run_is_cancelled_and_a_stop_acknowledged(client: Client, service: Service) -> None:
     run = await aside(client.run)
     assert (await aside(run.cancel)).state == "cancelled"

@@ -1,0 +1,78 @@
+"""What there is to judge by: runs and calibrations from the store, and what was made of them."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from calib import Calibration
+from calib.errors import ImageError
+from calib.picture_file import load_picture
+from daemon.errors import SessionUnreadableError, UnknownCalibrationError, UnknownViewError
+from daemon.jpeg import encoded
+from daemon.judging.sightings import Sightings
+from daemon.judging.views import JudgedView, views_by_calibration, views_by_themselves
+from daemon.procedure import RunManager
+from daemon.procedure.measured import session_of
+from daemon.procedure.worker import in_worker
+from daemon.store import Store
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedRun:
+    """A run's views, and by which calibration they are judged; None where each is by itself."""
+
+    calibration_id: str | None
+    views: Sequence[JudgedView]
+
+
+class Judge:
+    """Answers from disk, in worker threads; the loop has nothing to compute."""
+
+    def __init__(self, store: Store, runs: RunManager) -> None:
+        self._store = store
+        self._runs = runs
+        self._sightings = Sightings()
+
+    async def views(self, run_id: str, calibration_id: str | None = None) -> JudgedRun:
+        """Return a run's views as a calibration of it says of them, the run's latest unless another is named.
+
+        Raises UnknownRunError, UnknownCalibrationError, SessionUnreadableError, FormatError and StoreError.
+        """
+        run = await self._runs.get(run_id)
+        session = await asyncio.to_thread(session_of, run, self._store.session_folder(run))
+        if session is None:
+            return JudgedRun(None, [])
+        # A run that is taken up again may give a number to another view than its calibration knows by it.
+        found = calibration_id or (run.calibration_id if session.complete or run.state.over else None)
+        if found is None:
+            observed = await self._sightings.of(run_id, session)
+            return JudgedRun(None, await in_worker(lambda: views_by_themselves(session, observed)))
+        calibration = await self._calibration(found, run_id)
+        events = await self._runs.told(run_id)
+        return JudgedRun(found, views_by_calibration(session, calibration, events))
+
+    async def picture(self, run_id: str, number: int) -> Path:
+        """Return where a view's picture is; raises UnknownRunError, UnknownViewError, SessionUnreadableError."""
+        run = await self._runs.get(run_id)
+        folder = self._store.session_folder(run)
+        session = await asyncio.to_thread(session_of, run, folder)
+        count = 0 if session is None else len(session.views)
+        if session is None or number >= count:
+            raise UnknownViewError(f"there is no view {number}: this run has {count}, counted from 0")
+        return folder / (session.views[number].image or "")
+
+    async def jpeg(self, picture: Path, width: int | None) -> bytes:
+        """Return a picture as JPEG, no wider than `width` px; raises SessionUnreadableError."""
+        try:
+            return await asyncio.to_thread(lambda: encoded(load_picture(picture), width))
+        except ImageError as error:
+            raise SessionUnreadableError(str(error)) from error
+
+    async def _calibration(self, calibration_id: str, run_id: str) -> Calibration:
+        record = await self._store.calibration(calibration_id)
+        if record.run_id != run_id:
+            raise UnknownCalibrationError(
+                f"calibration '{calibration_id}' is of run '{record.run_id}', and not of '{run_id}'"
+            )
+        return await asyncio.to_thread(record.read)
