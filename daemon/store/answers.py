@@ -1,13 +1,15 @@
 """Answers to requests that had an idempotency key, on disk until they expire."""
 
-import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Self
 
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
 from daemon.store.database import Database
-from daemon.store.tables import text_of, time_of
+from daemon.store.tables import AnswerRow
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +45,27 @@ class StoredAnswers:
     async def read(self, since: datetime) -> Sequence[KeptRequest]:
         """Return the requests asked since then, the oldest first; those before are forgotten."""
 
-        def work(connection: sqlite3.Connection) -> list[KeptRequest]:
-            _forget(connection, since)
-            return [_request(row) for row in connection.execute("SELECT * FROM answers ORDER BY asked_at")]
+        def work(session: Session) -> list[KeptRequest]:
+            session.execute(delete(AnswerRow).where(AnswerRow.asked_at < since))
+            return [_request(row) for row in session.scalars(select(AnswerRow).order_by(AnswerRow.asked_at))]
 
         return await self._database.transact(work)
 
     async def add(self, request: KeptRequest, since: datetime) -> None:
         """Store a request that is about to be carried out; those asked before `since` are forgotten."""
 
-        def work(connection: sqlite3.Connection) -> None:
-            _forget(connection, since)
-            connection.execute(
-                "REPLACE INTO answers (key, fingerprint, asked_at) VALUES (?, ?, ?)",
-                (request.key, request.fingerprint, text_of(request.asked_at)),
+        def work(session: Session) -> None:
+            session.execute(delete(AnswerRow).where(AnswerRow.asked_at < since))
+            session.merge(
+                AnswerRow(
+                    key=request.key,
+                    fingerprint=request.fingerprint,
+                    asked_at=request.asked_at,
+                    status=None,
+                    media_type=None,
+                    body=None,
+                    location=None,
+                )
             )
 
         await self._database.transact(work)
@@ -64,21 +73,17 @@ class StoredAnswers:
     async def settle(self, key: str, answer: KeptAnswer) -> None:
         """Store what a request was answered."""
 
-        def work(connection: sqlite3.Connection) -> None:
-            connection.execute(
-                "UPDATE answers SET status = ?, media_type = ?, body = ?, location = ? WHERE key = ?",
-                (answer.status, answer.media_type, answer.body, answer.location, key),
-            )
+        def work(session: Session) -> None:
+            row = session.get(AnswerRow, key)
+            if row is not None:
+                row.status, row.media_type = answer.status, answer.media_type
+                row.body, row.location = answer.body, answer.location
 
         await self._database.transact(work)
 
 
-def _forget(connection: sqlite3.Connection, before: datetime) -> None:
-    connection.execute("DELETE FROM answers WHERE asked_at < ?", (text_of(before),))
-
-
-def _request(row: sqlite3.Row) -> KeptRequest:
-    answer = None
-    if row["status"] is not None:
-        answer = KeptAnswer(row["status"], row["media_type"], row["body"], row["location"])
-    return KeptRequest(row["key"], row["fingerprint"], time_of(row["asked_at"]), answer)
+def _request(row: AnswerRow) -> KeptRequest:
+    if row.status is None or row.media_type is None or row.body is None:
+        return KeptRequest(row.key, row.fingerprint, row.asked_at)
+    answer = KeptAnswer(row.status, row.media_type, row.body, row.location)
+    return KeptRequest(row.key, row.fingerprint, row.asked_at, answer)

@@ -3,25 +3,26 @@
 import asyncio
 import logging
 import shutil
-import sqlite3
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import IO, Final, Self, TypeVar
+from typing import IO, Any, Final, Self, TypeVar
+
+from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
 
 from daemon.errors import FolderInUseError, StoreError
 from daemon.store.copies import copy_database
 from daemon.store.folder_lock import lock_folder
 from daemon.store.migrations import migrate, schema_version
-from daemon.store.tables import TABLES
+from daemon.store.tables import Table
 
 logger = logging.getLogger(__name__)
 
 DATABASE: Final = "activecam.db"
 """Its name in the data folder."""
 
-BUSY: Final = 5.0
-"""Seconds for which a transaction waits for that of another process to end."""
 SHARED_MEMORY: Final = 32768
 """Bytes of the file through which those who use the database at the same time know of each other."""
 
@@ -37,7 +38,7 @@ class Database:
         self.errors = 0
         """How often it could not be used."""
         self._lock: IO[str] | None = None
-        self._connection: sqlite3.Connection | None = None
+        self._engine: Engine | None = None
         # One thread: SQLite writes one transaction at a time, and a commit waits for the disk.
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database")
 
@@ -63,29 +64,28 @@ class Database:
         await self._in_thread(self._close)
         self._thread.shutdown()
 
-    async def transact(self, work: Callable[[sqlite3.Connection], Result]) -> Result:
+    async def transact(self, work: Callable[[Session], Result]) -> Result:
         """Run `work` in a transaction of its own, on disk when this returns; raises StoreError."""
-        return await self._in_thread(lambda: self._transact(work))
 
-    def _transact(self, work: Callable[[sqlite3.Connection], Result]) -> Result:
-        assert self._connection is not None
-        with self._connection as connection:  # commits at the end, or takes all back
-            # One that began to read, and writes when another process has written meanwhile, would be refused.
-            connection.execute("BEGIN IMMEDIATE")
-            return work(connection)
+        def transaction() -> Result:
+            # Records are made inside the transaction, so nothing needs the rows after it.
+            with Session(self._engine) as session, session.begin():
+                return work(session)
+
+        return await self._in_thread(transaction)
 
     async def _in_thread(self, work: Callable[[], Result]) -> Result:
         try:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
-        except sqlite3.Error as error:
+        except SQLAlchemyError as error:
             self.errors += 1
             raise StoreError(f"{self.path}: the database cannot be used: {self._reason_of(error)}") from error
         except ValueError as error:
             raise StoreError(f"{self.path}: a record in the database is damaged: {error}") from error
 
-    def _reason_of(self, error: sqlite3.Error) -> str:
-        """Return what SQLite said; of a full disk, what to do about it."""
-        reason = str(error)
+    def _reason_of(self, error: SQLAlchemyError) -> str:
+        """Return what SQLite said, without the statement that it said it of; of a full disk, what to do about it."""
+        reason = str(getattr(error, "orig", None) or error).splitlines()[0]
         full = reason == "database or disk is full"
         if reason == "disk I/O error":  # as SQLite says, too, where there is no room for its shared memory
             full = shutil.disk_usage(self.folder).free < SHARED_MEMORY
@@ -93,15 +93,16 @@ class Database:
 
     def _open(self) -> None:
         self._lock = lock_folder(self.folder)
-        self._connect()
-        self._bring_to_today()
+        self._engine = self._connect()
+        self._bring_to_today(self._engine)
 
     def _open_beside(self) -> None:
         try:
             self._open()
         except FolderInUseError:
-            self._connect()
-            version = self._transact(_version)
+            self._engine = self._connect()
+            with self._engine.begin() as connection:
+                version: int = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
             if version != schema_version():
                 raise StoreError(
                     f"{self.path}: used by an activecam of another version (schema {version}, this one knows "
@@ -114,29 +115,33 @@ class Database:
             self._lock.close()
             self._lock = None
 
-    def _connect(self) -> None:
-        # Left to itself, sqlite3 begins a transaction for some statements and not for others.
-        self._connection = sqlite3.connect(self.path, timeout=BUSY, isolation_level=None)
-        self._connection.row_factory = sqlite3.Row
-        for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
-            self._connection.execute(f"PRAGMA {pragma}")
+    def _connect(self) -> Engine:
+        engine = create_engine(f"sqlite:///{self.path}")
+        event.listen(engine, "connect", _make_durable)
+        event.listen(engine, "begin", _begin)
+        return engine
 
-    def _bring_to_today(self) -> None:
-        version = self._transact(_create_if_new)
+    def _bring_to_today(self, engine: Engine) -> None:
+        with engine.begin() as connection:
+            version: int = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
+            if version == 0:
+                Table.metadata.create_all(connection)
+                connection.exec_driver_sql(f"PRAGMA user_version = {schema_version()}")
         if version > schema_version():
             raise StoreError(
                 f"{self.path}: written by a newer activecam (schema {version}, this one knows "
                 f"{schema_version()}): install that version, or choose another --data"
             )
         if 0 < version < schema_version():
-            self._migrate(version)
+            self._migrate(engine, version)
 
-    def _migrate(self, version: int) -> None:
+    def _migrate(self, engine: Engine, version: int) -> None:
         copy = self.folder / f"activecam.schema-{version}.db"
         copy_database(self.path, copy)
         try:
-            self._transact(lambda connection: migrate(connection, version))
-        except sqlite3.Error as error:
+            with engine.begin() as connection:
+                migrate(connection, version)
+        except SQLAlchemyError as error:
             raise StoreError(
                 f"{self.path}: of schema {version}, and could not be brought to schema {schema_version()} "
                 f"({self._reason_of(error)}): it is as it was, so go on with the activecam that wrote it, "
@@ -151,21 +156,20 @@ class Database:
         )
 
     def _close(self) -> None:
-        if self._connection is not None:
-            self._connection.close()
+        if self._engine is not None:
+            self._engine.dispose()
         self._let_go()
 
 
-def _version(connection: sqlite3.Connection) -> int:
-    version: int = connection.execute("PRAGMA user_version").fetchone()[0]
-    return version
+def _make_durable(connection: Any, _record: Any) -> None:
+    # Left to itself, sqlite3 begins no transaction for a change of the tables; see `_begin`.
+    connection.isolation_level = None
+    cursor = connection.cursor()
+    for pragma in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON", "busy_timeout = 5000"):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()
 
 
-def _create_if_new(connection: sqlite3.Connection) -> int:
-    """Return the schema that the database was of, 0 for one that was not there; it has the tables then."""
-    version = _version(connection)
-    if version == 0:
-        for statement in TABLES:
-            connection.execute(statement)
-        connection.execute(f"PRAGMA user_version = {schema_version()}")
-    return version
+def _begin(connection: Connection) -> None:
+    # A transaction that began to read, and writes when another process has written meanwhile, would be refused.
+    connection.exec_driver_sql("BEGIN IMMEDIATE")

@@ -1,14 +1,17 @@
 """The API keys, kept as their hashes. Every method raises StoreError when the disk fails."""
 
-import sqlite3
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+
+from sqlalchemy import delete, select, update
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
 
 from daemon.access.keys import ApiKey
 from daemon.access.roles import Role
 from daemon.errors import KeyExistsError, UnknownKeyError
 from daemon.store.database import Database
-from daemon.store.tables import insert, maybe_time_of, text_of, time_of
+from daemon.store.tables import ApiKeyRow
 
 
 class StoredKeys:
@@ -19,19 +22,17 @@ class StoredKeys:
 
     async def all(self) -> Sequence[ApiKey]:
         """Return all keys, by name."""
-        return await self._database.transact(
-            lambda connection: [
-                _key(row) for row in connection.execute("SELECT * FROM api_keys ORDER BY name")
-            ]
-        )
+        by_name = select(ApiKeyRow).order_by(ApiKeyRow.name)
+        return await self._database.transact(lambda session: [_key(row) for row in session.scalars(by_name)])
 
     async def add(self, key: ApiKey) -> None:
         """Store a new key; raises KeyExistsError."""
 
-        def work(connection: sqlite3.Connection) -> None:
+        def work(session: Session) -> None:
+            session.add(ApiKeyRow(**{name: getattr(key, name) for name in ApiKey.__dataclass_fields__}))
             try:
-                insert(connection, "api_keys", key)
-            except sqlite3.IntegrityError:
+                session.flush()
+            except IntegrityError:
                 raise KeyExistsError(
                     f"there is a key '{key.name}' already: choose another name, or remove that one first"
                 ) from None
@@ -41,8 +42,11 @@ class StoredKeys:
     async def remove(self, name: str) -> None:
         """Forget a key; raises UnknownKeyError."""
 
-        def work(connection: sqlite3.Connection) -> None:
-            if not connection.execute("DELETE FROM api_keys WHERE name = ?", (name,)).rowcount:
+        def work(session: Session) -> None:
+            found = session.scalars(
+                delete(ApiKeyRow).where(ApiKeyRow.name == name).returning(ApiKeyRow.name)
+            ).all()
+            if not found:
                 raise UnknownKeyError(
                     f"there is no key '{name}': 'activecam key list' lists those that there are"
                 )
@@ -52,20 +56,12 @@ class StoredKeys:
     async def used(self, times: Mapping[str, datetime]) -> None:
         """Store when the keys of these hashes were used last; those that are gone stay gone."""
 
-        def work(connection: sqlite3.Connection) -> None:
-            connection.executemany(
-                "UPDATE api_keys SET last_used_at = ? WHERE digest = ?",
-                [(text_of(time), digest) for digest, time in times.items()],
-            )
+        def work(session: Session) -> None:
+            for digest, time in times.items():
+                session.execute(update(ApiKeyRow).where(ApiKeyRow.digest == digest).values(last_used_at=time))
 
         await self._database.transact(work)
 
 
-def _key(row: sqlite3.Row) -> ApiKey:
-    return ApiKey(
-        row["name"],
-        Role(row["role"]),
-        row["digest"],
-        time_of(row["created_at"]),
-        maybe_time_of(row["last_used_at"]),
-    )
+def _key(row: ApiKeyRow) -> ApiKey:
+    return ApiKey(row.name, Role(row.role), row.digest, row.created_at, row.last_used_at)

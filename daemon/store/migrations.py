@@ -12,26 +12,27 @@ Foreign keys are looked at when all is done. A table that SQLite cannot alter is
 name, copy, drop the old one, rename.
 """
 
-import sqlite3
 from collections.abc import Callable
 from typing import Final
 
-Migration = Callable[[sqlite3.Connection], None]
+from sqlalchemy import Connection
+
+Migration = Callable[[Connection], None]
 
 
-def _add_answers(connection: sqlite3.Connection) -> None:
-    connection.execute(
+def _add_answers(connection: Connection) -> None:
+    connection.exec_driver_sql(
         "CREATE TABLE answers (key TEXT NOT NULL, fingerprint TEXT NOT NULL, asked_at DATETIME NOT NULL, "
         "status INTEGER, media_type TEXT, body BLOB, location TEXT, PRIMARY KEY (key))"
     )
 
 
-def _add_access(connection: sqlite3.Connection) -> None:
-    connection.execute(
+def _add_access(connection: Connection) -> None:
+    connection.exec_driver_sql(
         "CREATE TABLE api_keys (name TEXT NOT NULL PRIMARY KEY, role TEXT NOT NULL, digest TEXT NOT NULL UNIQUE, "
         "created_at DATETIME NOT NULL, last_used_at DATETIME)"
     )
-    connection.execute(
+    connection.exec_driver_sql(
         "CREATE TABLE audit (id INTEGER NOT NULL PRIMARY KEY, time DATETIME NOT NULL, who TEXT, role TEXT NOT NULL, "
         "address TEXT NOT NULL, method TEXT NOT NULL, path TEXT NOT NULL, asked TEXT NOT NULL, status INTEGER, "
         "code TEXT)"
@@ -47,9 +48,9 @@ def schema_version() -> int:
     return 1 + len(MIGRATIONS)
 
 
-def migrate(connection: sqlite3.Connection, version: int) -> None:
+def migrate(connection: Connection, version: int) -> None:
     """Bring the database from schema `version` to today's, in the transaction that `connection` is in."""
-    connection.execute("PRAGMA defer_foreign_keys = ON")
+    connection.exec_driver_sql("PRAGMA defer_foreign_keys = ON")
     for migration in MIGRATIONS[version - 1 :]:
         migration(connection)
-    connection.execute(f"PRAGMA user_version = {schema_version()}")
+    connection.exec_driver_sql(f"PRAGMA user_version = {schema_version()}")

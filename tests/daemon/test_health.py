@@ -55,7 +55,9 @@ async def test_a_store_that_takes_nothing_is_in_the_way(
 
 
 async def test_a_store_that_fails_is_in_the_way(service: Service, client: httpx.AsyncClient) -> None:
-    await service.store._database.transact(lambda connection: connection.execute("PRAGMA query_only = ON"))
+    await service.store._database.transact(
+        lambda session: session.connection().exec_driver_sql("PRAGMA query_only = ON")
+    )
     status, [sentence] = await ready(client)
     assert (status, "readonly database" in sentence) == (503, True)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import Connection
 
 from calib import Calibration
 from daemon.errors import StoreError
@@ -79,19 +80,19 @@ def test_every_schema_is_kept_for_these_tests() -> None:
     assert list(range(1, migrations.schema_version() + 1)) == VERSIONS
 
 
-def add_a_place(connection: sqlite3.Connection) -> None:
-    connection.execute("ALTER TABLE runs ADD COLUMN place TEXT")
-    connection.execute("UPDATE runs SET place = 'the cellar'")
+def add_a_place(connection: Connection) -> None:
+    connection.exec_driver_sql("ALTER TABLE runs ADD COLUMN place TEXT")
+    connection.exec_driver_sql("UPDATE runs SET place = 'the cellar'")
 
 
-def break_off(connection: sqlite3.Connection) -> None:
+def break_off(connection: Connection) -> None:
     add_a_place(connection)
-    connection.execute("CREATE TABLE visitors (id INTEGER PRIMARY KEY)")
-    connection.execute("UPDATE there_is_no_such_table SET place = 1")
+    connection.exec_driver_sql("CREATE TABLE visitors (id INTEGER PRIMARY KEY)")
+    connection.exec_driver_sql("UPDATE there_is_no_such_table SET place = 1")
 
 
-def lose_a_calibration(connection: sqlite3.Connection) -> None:
-    connection.execute("DELETE FROM calibrations")
+def lose_a_calibration(connection: Connection) -> None:
+    connection.exec_driver_sql("DELETE FROM calibrations")
 
 
 @pytest.fixture

@@ -217,4 +217,4 @@ import daemon.profile
 print(*set(sys.modules) - before)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"cv2", "scipy", "fastapi"} & set(done.stdout.split())
+    assert not {"cv2", "scipy", "sqlalchemy", "fastapi"} & set(done.stdout.split())
