@@ -32,6 +32,9 @@
     │   ├── IdempotencyConflictError           this key was another request's
     │   ├── IdempotencyInProgressError         the first request of this key is still under way
     │   └── IdempotencyUnknownError            how the first request of this key ended is not known
+    ├── ExportError
+    │   ├── UnknownExportError (KeyError)      no export of this name
+    │   └── ExportUnavailableError             this calibration cannot be had in this form
     ├── BackupError                            a backup that cannot be made, or not be restored
     ├── AccessError
     │   ├── KeyRequiredError                   a request without a key, where one is asked for
@@ -185,6 +188,18 @@ class IdempotencyInProgressError(IdempotencyError):
 
 class IdempotencyUnknownError(IdempotencyError):
     """The request of this key was begun, and the daemon ended before it was answered."""
+
+
+class ExportError(DaemonError):
+    """A calibration cannot be taken away in this form."""
+
+
+class UnknownExportError(ExportError, KeyError):
+    """There is no export of this name."""
+
+
+class ExportUnavailableError(ExportError):
+    """The calibration cannot be had in this form: its session is gone, or the format cannot say what it knows."""
 
 
 class BackupError(DaemonError):

@@ -7,7 +7,7 @@ Its parts:
     gate            who is let in, by rules;  witness  what is written down of it;  security  what is described of it
     problems        errors as problem documents;  dependencies, bodies  what routes are given
     once            requests that are carried out once, however often they are sent
-    rig, health, lease, axes, camera, runs, calibrations, poses, pose_stream, metrics, session, audit
+    rig, health, lease, axes, camera, runs, calibrations, exports, poses, pose_stream, metrics, session, audit
                     routes by what they are about;  *_documents  their larger answers
     reference       all of it as a page to read
 """

@@ -11,6 +11,7 @@ from daemon.api import (
     axes,
     calibrations,
     camera,
+    exports,
     health,
     lease,
     metrics,
@@ -30,7 +31,7 @@ from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
 from daemon.service import Service
 
-API_VERSION: Final = "1.1.0"
+API_VERSION: Final = "1.2.0"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
@@ -91,6 +92,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
         runs,
         views,
         calibrations,
+        exports,
         session,
         audit,
     ):

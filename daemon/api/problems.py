@@ -65,6 +65,10 @@ PROBLEMS: Final[dict[type[Exception], Kind]] = {
     daemon.UnknownViewError: Kind(404, "unknown_view", "The run has no such view"),
     daemon.SessionUnreadableError: Kind(409, "session_unreadable", "The run's views cannot be read"),
     daemon.UnknownCalibrationError: Kind(404, "unknown_calibration", "There is no such calibration"),
+    daemon.UnknownExportError: Kind(404, "unknown_export", "There is no such export"),
+    daemon.ExportUnavailableError: Kind(
+        409, "export_unavailable", "The calibration cannot be had in this form"
+    ),
     daemon.IdempotencyConflictError: Kind(422, "idempotency_conflict", "The key was another request's"),
     daemon.IdempotencyInProgressError: Kind(
         409, "idempotency_in_progress", "The first request of this key is under way"

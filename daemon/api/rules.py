@@ -49,6 +49,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "GET /calibrations": VIEWER,
     "GET /calibrations/current": VIEWER,
     "GET /calibrations/{calibration_id}": VIEWER,
+    "GET /calibrations/{calibration_id}/exports": VIEWER,
+    "GET /calibrations/{calibration_id}/exports/{name}": VIEWER,
     "POST /calibrations/{calibration_id}/activate": OPERATOR,
     "GET /session": VIEWER,
     "POST /session": VIEWER,

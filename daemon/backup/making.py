@@ -12,6 +12,7 @@ from calib.durable_files import put_in_place
 from daemon.backup.archive import CHUNK, open_backup
 from daemon.backup.manifest import NAME, SESSIONS, Manifest
 from daemon.errors import BackupError
+from daemon.session_files import session_files
 from daemon.store.copies import copy_database
 from daemon.store.database import DATABASE
 
@@ -47,8 +48,7 @@ def make_backup(data: Path, file: Path) -> int:
 
 def _session_files(data: Path) -> Iterator[Path]:
     for session in sorted((data / SESSIONS).glob("*")):
-        inner = sorted(path for path in session.rglob("*") if path.is_file() and path.suffix != ".tmp")
-        yield from sorted(inner, key=lambda path: path.name != "session.json")
+        yield from session_files(session)
 
 
 def _put(archive: ZipFile, path: Path, inside: str) -> str:

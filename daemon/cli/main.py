@@ -30,6 +30,7 @@ MODULES: Final = {
     "pose": "pose",
     "verify": "verify",
     "truth": "truth",
+    "export": "export",
     "target": "target",
     "backup": "backup",
     "restore": "backup",
