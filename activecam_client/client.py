@@ -125,10 +125,16 @@ class Client:
         """Return the right to move, for a `with` block. Without a sign of life it ends after `ttl` seconds."""
         return Lease(self._connection, owner, note, ttl)
 
-    def run(self, owner: str = "", note: str = "", lease: Lease | None = None) -> Run:
-        """Start a calibration run; whoever holds the lease hands it over."""
+    def run(
+        self, owner: str = "", note: str = "", lease: Lease | None = None, from_here: Sequence[str] = ()
+    ) -> Run:
+        """Start a calibration run; whoever holds the lease hands it over.
+
+        The first sweep of each of the joints `from_here` starts from where the axes stand.
+        """
         headers = None if lease is None else lease.headers
-        started = self._connection.ask("POST", "/runs", {"owner": owner, "note": note}, headers=headers)
+        body = {"owner": owner, "note": note, "from_here": list(from_here)}
+        started = self._connection.ask("POST", "/runs", body, headers=headers)
         return Run(self._connection, started["id"])
 
     def runs(self) -> list[RunRecord]:

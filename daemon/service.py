@@ -23,6 +23,7 @@ from daemon.operation.pulse import watch_loop
 from daemon.operation.rig_figures import RigFigures
 from daemon.pose import ActiveCalibration, Fallback, PoseService
 from daemon.procedure import RunManager
+from daemon.procedure.checklist import Checklist
 from daemon.profile import Profile
 from daemon.rig import Devices, Rig
 from daemon.store import CalibrationRecord, Store
@@ -49,6 +50,7 @@ class Service:
         self.judge = Judge(store, self.runs)
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
+        self.checklist = Checklist(rig, self.leases, self.runs, self.sightings, self.poses, store.folder)
         self.streams = Streams()
         self.answers = AnswersGiven(store.answers)
         self.figures.registry.register(RigFigures(self))

@@ -15,6 +15,7 @@ from daemon.api import (
     health,
     lease,
     metrics,
+    plan,
     pose_stream,
     poses,
     problems,
@@ -31,7 +32,7 @@ from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
 from daemon.service import Service
 
-API_VERSION: Final = "1.2.0"
+API_VERSION: Final = "1.3.0"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
@@ -89,6 +90,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
         lease,
         axes,
         camera,
+        plan,
         runs,
         views,
         calibrations,

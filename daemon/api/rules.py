@@ -38,6 +38,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "POST /axes/{name}/stop": OPERATOR,
     "GET /runs": VIEWER,
     "POST /runs": OPERATOR,
+    "GET /runs/plan": VIEWER,
+    "GET /runs/checklist": VIEWER,
     "GET /runs/{run_id}": VIEWER,
     "GET /runs/{run_id}/events": VIEWER,
     "GET /runs/{run_id}/views": VIEWER,

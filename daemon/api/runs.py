@@ -21,11 +21,13 @@ from daemon.errors import (
     SessionUnreadableError,
     StopLatchedError,
     StoreError,
+    UnknownAxisError,
     UnknownRunError,
     UnknownViewError,
 )
 from daemon.procedure import RunEvent
 from daemon.store import RunRecord, RunState
+from drivers.errors import AxisBusyError, LimitError, NotHomedError
 
 router = APIRouter(prefix="/runs", tags=["runs"], route_class=OnceRoute)
 
@@ -33,10 +35,18 @@ RunId = Annotated[str, Path(description="The run's id.", examples=["20260314-092
 
 
 class RunRequest(RequestBody):
-    """Who starts the run and what for; both for the record only."""
+    """Who starts the run and what for, both for the record only; and from where, if not as the profile has it."""
 
     owner: Annotated[str, Field(max_length=200)] = ""
     note: Annotated[str, Field(max_length=1000)] = ""
+    from_here: Annotated[
+        list[str],
+        Field(
+            max_length=100,
+            description="Joints whose first sweep starts from where the axes stand now.",
+            examples=[["pan"]],
+        ),
+    ] = []  # noqa: RUF012  pydantic copies it
 
 
 ViewNumber = Annotated[int, Field(ge=0)]
@@ -94,7 +104,17 @@ async def list_runs(service: ServiceDep) -> list[RunDocument]:
     status_code=202,
     summary="Start the profile's procedure",
     responses=answers(
-        RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError, StoreError, *KEYED
+        RunActiveError,
+        RunStateError,
+        StopLatchedError,
+        RigFaultError,
+        LeaseHeldError,
+        UnknownAxisError,
+        NotHomedError,
+        LimitError,
+        AxisBusyError,
+        StoreError,
+        *KEYED,
     ),
     dependencies=[ONCE_DURABLY],
 )
@@ -109,9 +129,12 @@ async def start_run(
 
     A run moves under a lease of its own, so that it goes on when the client that started it goes away. It
     needs none beforehand; the holder of the lease hands it over by showing its token in `X-Lease`.
+
+    With `from_here` the first sweep of these joints starts from where all axes stand now, instead of where the profile
+    says; the joint itself goes through the positions of the profile.
     """
     request = request or RunRequest()
-    run = await service.runs.start(request.owner, request.note, token)
+    run = await service.runs.start(request.owner, request.note, token, request.from_here)
     response.headers["Location"] = http.url_for("get_run", run_id=run.id).path
     return RunDocument.of(run)
 

@@ -1,7 +1,7 @@
 """What a run is to do: measure and solve, or solve what an earlier run has measured."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -10,6 +10,7 @@ from daemon.procedure.conclusion import Conclusion, conclude
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import StateChanged
 from daemon.procedure.survey import Survey
+from daemon.profile.profile import NOWHERE_ELSE
 from daemon.rig import Rig
 from daemon.store import RunRecord, RunState
 from drivers.cancellation import finish
@@ -42,14 +43,18 @@ class Assignment(Protocol):
 
 
 class Calibrate:
-    """Take the views that the session in `folder` lacks, and solve it; its calibration is to be used."""
+    """Take the views that the session in `folder` lacks, and solve it; its calibration is to be used.
+
+    `starts`, as for `Procedure.starting`, are those of a new session; one that there is has its own.
+    """
 
     moves = True
     activates = True
 
-    def __init__(self, rig: Rig, folder: Path) -> None:
+    def __init__(self, rig: Rig, folder: Path, starts: Mapping[str, Sequence[float]] = NOWHERE_ELSE) -> None:
         self._rig = rig
         self._folder = folder
+        self._starts = starts
 
     async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:
         """Measure and solve."""
@@ -72,7 +77,7 @@ class Calibrate:
     def _writer(self) -> SessionWriter:
         if (self._folder / "session.json").exists():
             return SessionWriter.resume(self._folder)
-        return SessionWriter(self._folder, self._rig.profile.empty_session())
+        return SessionWriter(self._folder, self._rig.profile.empty_session(self._starts))
 
 
 class Solve:

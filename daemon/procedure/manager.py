@@ -14,6 +14,7 @@ from daemon.procedure.beginning import new_record, require_same_profile
 from daemon.procedure.event_log import EventLog, Told, past_events
 from daemon.procedure.events import RunEvent
 from daemon.procedure.measured import require_views
+from daemon.procedure.plan import starts_here
 from daemon.procedure.run import Run
 from daemon.rig import Rig
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
@@ -51,15 +52,21 @@ class RunManager:
         latest = self._latest
         return None if latest is None or latest.record.state.over else latest
 
-    async def start(self, owner: str = "", note: str = "", token: str | None = None) -> RunRecord:
+    async def start(
+        self, owner: str = "", note: str = "", token: str | None = None, from_here: Sequence[str] = ()
+    ) -> RunRecord:
         """Start the profile's whole procedure; `token` shows the starter's lease, if there is one.
 
-        Before anything moves, raises RunActiveError, RunStateError, StopLatchedError, RigFaultError,
-        LeaseHeldError and StoreError.
+        The first sweep of each of the joints `from_here` starts from where the axes stand now. Before anything moves,
+        raises RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError and StoreError; and for
+        those joints what `starts_here` raises, and AxisBusyError.
         """
         async with self._starting:
             await self.settle()
             self._require_able()
+            starts = starts_here(self._rig, from_here)
+            for start in starts.values():
+                self._rig.check_move(dict(zip(self._rig.specs, start, strict=True)))
             record = new_record(self._rig.profile, owner, note)
             folder = self._store.session_folder(record)
 
@@ -67,7 +74,7 @@ class RunManager:
                 await self._store.add_run(record)
                 return EventLog(record.id, folder)
 
-            return await self._begin(record, Calibrate(self._rig, folder), take_up, token)
+            return await self._begin(record, Calibrate(self._rig, folder, starts), take_up, token)
 
     async def resume(self, run_id: str, token: str | None = None) -> RunRecord:
         """Let a paused run go on; take up one that ended before its time after the last sweep that it finished.

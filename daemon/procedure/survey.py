@@ -30,7 +30,8 @@ Checkpoint = Callable[[], Awaitable[None]]
 class Survey:
     """Takes the views of the profile's procedure that the session lacks.
 
-    A session that has views already goes on after its last finished sweep, once all axes have been homed anew.
+    A session that has views already goes on after its last finished sweep, once all axes have been homed anew. Its
+    `starts` say which sweeps begin elsewhere than planned.
     `checkpoint` is awaited before each position.
     """
 
@@ -40,7 +41,7 @@ class Survey:
         self._log = log
         self._checkpoint = checkpoint
         self._observer = Observer(rig)
-        self._procedure = rig.profile.procedure
+        self._procedure = rig.profile.procedure.starting(writer.session.starts)
         self._positions = sum(1 for _ in self._procedure.planned_views())
         self._position = 0
         self._resumed = bool(writer.session.views or writer.session.set_aside)

@@ -1,7 +1,7 @@
 """The pictures that a calibration takes, as positions of all axes in their reading units."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -59,6 +59,23 @@ class Procedure:
     """How many are taken at each position, and averaged."""
     sweeps: tuple[Sweep, ...]
     views: tuple[FreeView, ...]
+
+    def starting(self, starts: Mapping[str, Sequence[float]]) -> "Procedure":
+        """Return this procedure with the first sweep of some joints begun elsewhere.
+
+        `starts` says by joint where all axes stand then, in chain order; the joint itself still begins where it would.
+        """
+        left, sweeps = dict(starts), []
+        for sweep in self.sweeps:
+            readings = left.pop(sweep.joint, None)
+            if readings is None:
+                sweeps.append(sweep)
+            else:
+                there = dict(zip(sweep.start, readings, strict=True)) | {
+                    sweep.joint: sweep.start[sweep.joint]
+                }
+                sweeps.append(replace(sweep, start=MappingProxyType(there)))
+        return replace(self, sweeps=tuple(sweeps))
 
     def planned_views(self) -> Iterator[PlannedView]:
         """Yield every picture in the order in which they are taken: the sweeps', then the free ones."""

@@ -1,9 +1,10 @@
 """A rig as its profile describes it, checked: what the daemon is built from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from calib.session import SESSION_FORMAT, Session
 from calib.targets import Target
@@ -11,6 +12,8 @@ from daemon.profile.axes import AxisProfile
 from daemon.profile.devices import CameraProfile, ControllerProfile
 from daemon.profile.procedure import Procedure
 from drivers.simulated.options import SimulationOptions
+
+NOWHERE_ELSE: Final[Mapping[str, Sequence[float]]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +37,8 @@ class Profile:
     source: Path | None
     """The file that it was read from."""
 
-    def empty_session(self) -> Session:
-        """Return the session of a run that has not taken a picture yet.
+    def empty_session(self, starts: Mapping[str, Sequence[float]] = NOWHERE_ELSE) -> Session:
+        """Return the session of a run that has not taken a picture yet, with `starts` as for `Procedure.starting`.
 
         Its key `complete` is false, and becomes true when a run has ended as planned.
         """
@@ -49,6 +52,7 @@ class Profile:
                 "target": self.target.model_dump(exclude_unset=True),
                 "views": [],
             }
+            | ({"starts": starts} if starts else {})
         )
 
 

@@ -31,6 +31,11 @@ class Store:
         """Open or create what is stored in `folder`; see `Database.open`."""
         return cls(await Database.open(folder, beside_daemon=beside_daemon))
 
+    @property
+    def folder(self) -> Path:
+        """The data folder."""
+        return self._database.folder
+
     async def close(self) -> None:
         """Let the database go."""
         await self._database.close()
