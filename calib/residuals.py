@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 class ViewResidual:
     """One view against the calibration.
 
-    `pixels` (n, 2) are predicted less measured points (px) and `ids` (n,) say which, None and empty where the view has
-    none. `predicted` and `measured` are world_from_camera (4, 4), `measured` from this view alone, None where nobody
-    asked.
+    `pixels` (n, 2) are predicted less measured points (px), `ids` (n,) say which and `places` (n, 2) where they were
+    measured; None and empty where the view has none. `predicted` and `measured` are world_from_camera (4, 4),
+    `measured` from this view alone, None where nobody asked.
     """
 
     view: int
@@ -36,6 +36,7 @@ class ViewResidual:
     predicted: Array
     measured: Array | None
     ids: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    places: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def errors(self) -> Array:
@@ -122,6 +123,7 @@ def _of_points(
             predicted[row],
             measured_pose(observation, target, points, lens) if measure_pose and calibration.joints else None,
             observation.ids,
+            observation.pixels,
         )
         for row, observation in enumerate(seen)
     ]

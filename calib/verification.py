@@ -16,7 +16,7 @@ from calib.calibration import Calibration
 from calib.closed_form import PoseViews
 from calib.detection import Prediction
 from calib.errors import FormatError
-from calib.observations import Observation, Progress, observe
+from calib.observations import Observation, Observed, Progress, observe
 from calib.prediction import predicted_by_calibration
 from calib.residuals import ViewResidual, view_residuals
 from calib.second_look import second_look
@@ -100,17 +100,10 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
     Raises FormatError where the session's joints or cameras are not the calibration's, UnsolvableError
     where the target is never seen, ImageError for a missing picture.
     """
-    _require_same_rig(calibration, session)
     marked = any(view.use == "verify" for view in session.views)
     use = "verify" if marked else "fit"
     judged = [index for index, view in enumerate(session.views) if view.use == use]
-
-    def predict(_: Sequence[Observation], view: View) -> Prediction:
-        camera = session.cameras[session.camera_index(view)].name
-        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
-
-    observed = second_look(session, observe(session, progress, judged), predict, progress)
-    residuals = view_residuals(calibration, session, observed.observations, measure_pose=True)
+    observed, residuals = compare(calibration, session, judged, progress)
     errors = np.concatenate([residual.errors for residual in residuals])
     placed = bool(calibration.joints)
     return Verification(
@@ -124,6 +117,23 @@ def verify(calibration: Calibration, session: Session, progress: Progress | None
         travel=_travels(calibration, session, residuals) if placed else [],
         warnings=observed.warnings(session),
     )
+
+
+def compare(
+    calibration: Calibration, session: Session, views: Sequence[int], progress: Progress | None = None
+) -> tuple[Observed, list[ViewResidual]]:
+    """Return what these `views` of a session show, by place, and how far that is from what `calibration` predicts.
+
+    Raises as `verify` does.
+    """
+    _require_same_rig(calibration, session)
+
+    def predict(_: Sequence[Observation], view: View) -> Prediction:
+        camera = session.cameras[session.camera_index(view)].name
+        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
+
+    observed = second_look(session, observe(session, progress, views), predict, progress)
+    return observed, view_residuals(calibration, session, observed.observations, measure_pose=True)
 
 
 def _require_same_rig(calibration: Calibration, session: Session) -> None:

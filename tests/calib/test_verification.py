@@ -6,6 +6,8 @@ import pytest
 from calib import Calibration, solve, verify
 from calib.errors import FormatError
 from calib.session import Session
+from calib.targets import target_points, target_symmetries
+from calib.verification import compare
 from tests.calib.scenes import DISK_CENTRES, DISKS, FOCAL, plan, points_session, two_axis_rig
 
 SESSION = points_session(two_axis_rig(), plan() + plan(verify=True), DISKS, DISK_CENTRES)
@@ -50,6 +52,28 @@ def test_a_wrong_scale_shows_in_its_joint_by_its_size(calibration: Calibration) 
     assert pan.rows[-1].predicted == pytest.approx(pan.rows[-1].measured, abs=1e-4)
     assert verdict.position_m is not None
     assert verdict.position_m.max == pytest.approx(0.01 * 0.063, rel=0.05)
+
+
+def test_points_are_compared_where_they_were_measured(calibration: Calibration) -> None:
+    """Whichever way round a view of a symmetric target was read."""
+    target = SESSION.target
+    turn = target_symmetries(target)[0].permutation
+    view = SESSION.views[3]
+    assert view.points is not None
+    turned = view.points.model_copy(update={"ids": turn[view.points.ids].tolist()})
+    session = SESSION.with_views([view, view.model_copy(update={"points": turned})])
+    wrong = calibration.model_dump()
+    wrong["cameras"][0]["intrinsics"]["cx"] += 3
+    wrongly = Calibration.model_validate(wrong)
+    _, residuals = compare(wrongly, session, [0, 1])
+    for residual in residuals:
+        assert residual.pixels is not None
+        predicted = wrongly.project(target_points(target)[residual.ids], view.readings)
+        np.testing.assert_allclose(
+            residual.places + residual.pixels, predicted, atol=0.1
+        )  # but for disks' offsets
+        np.testing.assert_allclose(residual.pixels.mean(axis=0), [3, 0], atol=0.02)
+    np.testing.assert_array_equal(residuals[0].places, view.points.pixels)
 
 
 def test_pixel_errors_are_distances_of_points(calibration: Calibration) -> None:
