@@ -10,9 +10,10 @@ from drivers.camera import Frame
 
 @dataclass(frozen=True, slots=True)
 class JpegPicture:
-    """An encoded frame and its number."""
+    """An encoded frame, its number, and its size (width, height) in pixels."""
 
     sequence: int
+    size: tuple[int, int]
     data: bytes
 
 
@@ -26,9 +27,13 @@ class LivePicture:
 
     async def newest(self) -> JpegPicture:
         """Return the newest frame; raises DeviceLostError, DeviceTimeoutError."""
-        frame = await self._rig.frame()
+        return await self.of(await self._rig.frame())
+
+    async def of(self, frame: Frame) -> JpegPicture:
+        """Return a frame, encoded only if it is another one than the last."""
         async with self._encoding:
             if self._encoded is None or self._encoded[0] is not frame:
                 data = await asyncio.to_thread(encoded, frame.image)
-                self._encoded = frame, JpegPicture(frame.sequence, data)
+                height, width = frame.image.shape[:2]
+                self._encoded = frame, JpegPicture(frame.sequence, (width, height), data)
             return self._encoded[1]

@@ -207,6 +207,7 @@ async def serving(service: Service, listening: socket.socket, door: Door = LOCAL
         log_config=None,
         access_log=False,
         ws_max_size=LARGEST_MESSAGE,
+        ws_per_message_deflate=False,  # pictures are compressed already, and all else is small
         proxy_headers=door.proxy,
         ssl_certfile=None if door.tls is None else door.tls.certificate,
         ssl_keyfile=None if door.tls is None else door.tls.key,

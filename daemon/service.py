@@ -18,6 +18,7 @@ from daemon.judging import Judge
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
+from daemon.live_view import LiveView
 from daemon.operation.figures import Figures
 from daemon.operation.pulse import watch_loop
 from daemon.operation.rig_figures import RigFigures
@@ -51,6 +52,7 @@ class Service:
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
         self.checklist = Checklist(rig, self.leases, self.runs, self.sightings, self.poses, store.folder)
+        self.view = LiveView(rig, self.pictures, self.sightings)
         self.streams = Streams()
         self.answers = AnswersGiven(store.answers)
         self.figures.registry.register(RigFigures(self))

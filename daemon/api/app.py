@@ -11,10 +11,13 @@ from daemon.api import (
     axes,
     calibrations,
     camera,
+    camera_live,
     exports,
     health,
     lease,
+    live,
     metrics,
+    page,
     plan,
     pose_stream,
     poses,
@@ -27,6 +30,7 @@ from daemon.api import (
 )
 from daemon.api.gate import Gate
 from daemon.api.guard import Guard
+from daemon.api.live_state import LiveState
 from daemon.api.observed import Observed
 from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
@@ -81,15 +85,18 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
         generate_unique_id_function=_operation_id,
     )
     app.state.service = service
+    app.state.live_state = LiveState(service)
     # Routes are tried in this order, so that the pose, which is asked most, comes first.
     for part in (
         poses,
         pose_stream,
         health,
         rig,
+        live,
         lease,
         axes,
         camera,
+        camera_live,
         plan,
         runs,
         views,
@@ -101,6 +108,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
         app.include_router(part.router, prefix=PREFIX)
     app.include_router(metrics.router)
     app.include_router(reference.router)
+    app.include_router(page.router)
     problems.install(app)
     app.add_middleware(Gate, service=service, rules=Rules(ROLES, ROLES_AT_ROOT))
     app.add_middleware(Guard, host_names=host_names)

@@ -2,14 +2,15 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncGenerator, AsyncIterator
+from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect, status
+from fastapi import APIRouter, Query, WebSocket
 from pydantic_core import to_json
 
 from calib.errors import CalibError
 from daemon.api import problems
+from daemon.api.sockets import first_of, left, send
 from daemon.errors import DaemonError
 from daemon.service import Service
 from drivers.errors import DriverError
@@ -29,19 +30,10 @@ async def stream_pose(
     service: Service = socket.app.state.service
     await socket.accept()
     poses = messages(service, camera, socket.url.path, 0.0 if rate is None else 1 / rate)
-    sending = asyncio.ensure_future(_send(socket, service.streams.follow(poses)))
-    leaving = asyncio.ensure_future(_left(socket))
-    try:
-        done, _ = await asyncio.wait({sending, leaving}, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in (sending, leaving):
-            task.cancel()
-        await asyncio.gather(sending, leaving, return_exceptions=True)
-    if sending in done:
-        sending.result()
+    await first_of(send(socket, service.streams.follow(poses)), left(socket))
 
 
-async def messages(service: Service, camera: str | None, address: str, period: float) -> AsyncIterator[bytes]:
+async def messages(service: Service, camera: str | None, address: str, period: float) -> AsyncIterator[str]:
     """Yield the pose now and at each new reading, `period` (s) apart at least, and each problem when it arises.
 
     Whoever asks for the next one late gets the newest.
@@ -57,11 +49,11 @@ async def messages(service: Service, camera: str | None, address: str, period: f
             sent, kind = None, problems.kind_of(error)
             if kind != told:
                 told = kind
-                yield to_json(problems.document(kind, str(error), address))
+                yield to_json(problems.document(kind, str(error), address)).decode()
         else:
             if read != sent:
                 since = 1 if sent is None else max(now - then for now, then in zip(read, sent, strict=True))
-                yield b'%s,"dropped":%d}' % (pose[:-1], since - 1)
+                yield f'{pose[:-1].decode()},"dropped":{since - 1}}}'
                 sent, told = read, None
                 due = max(due + period, loop.time())
                 await asyncio.sleep(due - loop.time())
@@ -70,18 +62,3 @@ async def messages(service: Service, camera: str | None, address: str, period: f
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(rig.profile.procedure.max_reading_age):
                 await rig.changed.wait()
-
-
-async def _send(socket: WebSocket, poses: AsyncGenerator[bytes | None]) -> None:
-    with contextlib.suppress(WebSocketDisconnect):
-        async with contextlib.aclosing(poses):
-            async for message in poses:
-                if message is not None:
-                    await socket.send_text(message.decode())
-        await socket.close(status.WS_1001_GOING_AWAY, "the daemon is shutting down")
-
-
-async def _left(socket: WebSocket) -> None:
-    """Return when the client has gone, which nothing else tells while there is nothing to send."""
-    while (await socket.receive())["type"] != "websocket.disconnect":
-        pass

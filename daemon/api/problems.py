@@ -1,7 +1,7 @@
 """Errors as RFC 9457 problem documents: one table from the exception trees to status, code and title."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
@@ -201,14 +201,23 @@ async def _answer_invalid(request: Request, error: Exception) -> Response:
     return _invalid(request, wrong)
 
 
+def invalid(errors: Sequence[Mapping[str, Any]], instance: str) -> dict[str, Any]:
+    """Return the problem document on what pydantic finds wrong with a message."""
+    wrong = [_invalid_field(error) for error in errors]
+    return document(INVALID, _in_words(wrong), instance) | {"errors": wrong}
+
+
 def _invalid(request: HTTPConnection, wrong: list[dict[str, str]]) -> Response:
+    return respond(request, INVALID, _in_words(wrong), errors=wrong)
+
+
+def _in_words(wrong: list[dict[str, str]]) -> str:
     more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
-    detail = f"{wrong[0]['field']}: {wrong[0]['message']}{more}"
-    return respond(request, INVALID, detail, errors=wrong)
+    return f"{wrong[0]['field']}: {wrong[0]['message']}{more}"
 
 
 def _invalid_field(error: Mapping[str, Any]) -> dict[str, str]:
-    if error["type"] == "json_invalid":
+    if error["type"] == "json_invalid" and error["loc"]:
         where, why = error["loc"][-1], error["ctx"]["error"]
         return {"field": "body", "message": f"Not JSON at character {where}: {why}"}
     return {"field": field_path(tuple(error["loc"])), "message": error["msg"]}

@@ -27,6 +27,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "GET /camera/frame.jpg": VIEWER,
     "GET /camera/detection": VIEWER,
     "GET /camera/stream.mjpg": VIEWER,
+    "WS /camera/live": VIEWER,
+    "WS /live": VIEWER,
     "POST /stop": OPERATOR,
     "POST /stop/acknowledge": OPERATOR,
     "POST /lease": OPERATOR,
@@ -61,7 +63,12 @@ ROLES: Final[dict[str, Role | None]] = {
     "GET /openapi.json": VIEWER,
 }
 """By method and path under PREFIX; None lets in who shows no key."""
-ROLES_AT_ROOT: Final[dict[str, Role | None]] = {"GET /metrics": VIEWER, "GET /docs": VIEWER}
+ROLES_AT_ROOT: Final[dict[str, Role | None]] = {
+    "GET /": None,
+    "GET /page/{file}": None,
+    "GET /metrics": VIEWER,
+    "GET /docs": VIEWER,
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,6 +52,11 @@ class RunManager:
         latest = self._latest
         return None if latest is None or latest.record.state.over else latest
 
+    @property
+    def latest(self) -> Run | None:
+        """The run under way, or the last one since the daemon began."""
+        return self._latest
+
     async def start(
         self, owner: str = "", note: str = "", token: str | None = None, from_here: Sequence[str] = ()
     ) -> RunRecord:

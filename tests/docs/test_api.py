@@ -10,10 +10,10 @@ from typing import Any, cast, get_args
 
 import jsonschema
 import pytest
-from fastapi import WebSocket
 from pydantic import BaseModel
 
-from daemon.api import create_app, pose_stream, problems
+from daemon.api import create_app, problems
+from daemon.api.rules import ROLES
 from daemon.procedure import RunEvent
 from daemon.service import Service, running_service
 from tests.daemon.rigs import small_rig
@@ -48,8 +48,7 @@ def _codes(cell: str) -> set[str]:
 
 
 def test_every_route_is_on_the_page_and_the_other_way_round() -> None:
-    assert pose_stream.router.routes[0].endpoint.__annotations__["socket"] is WebSocket  # type: ignore[attr-defined]
-    assert sorted(_rows()) == sorted([*_operations(), "WS /pose/stream"])
+    assert sorted(_rows()) == sorted([*_operations(), *(name for name in ROLES if name.startswith("WS"))])
 
 
 @pytest.mark.parametrize("route", _operations())
@@ -130,10 +129,17 @@ def test_the_examples_work_one_after_the_other(served: str, tmp_path: Path) -> N
     assert ran.returncode == 0, ran.stdout[-2000:] + ran.stderr[-500:]
     assert '"state":"succeeded"' in ran.stdout
     assert (tmp_path / "live.jpg").read_bytes().startswith(b"\xff\xd8")
-    program = blocks(PAGE, "python")[0].text.replace("ws://localhost:8080", served.replace("http", "ws"))
-    streamed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert streamed.returncode == 0, streamed.stderr
-    assert len(streamed.stdout.splitlines()) == 3
+    stopped, streamed = (_printed(block.text, served) for block in blocks(PAGE, "python"))
+    assert stopped == ["200 True"]
+    assert len(streamed) == 3
+
+
+def _printed(program: str, served: str) -> list[str]:
+    """Run a program that follows a stream, and return its lines."""
+    program = program.replace("ws://localhost:8080", served.replace("http", "ws"))
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout.splitlines()
 
 
 async def test_every_figure_is_on_the_page(tmp_path: Path) -> None:

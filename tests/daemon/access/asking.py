@@ -30,10 +30,12 @@ async def outcome(http: httpx.AsyncClient, route: str, headers: dict[str, str]) 
     """Ask, and return the status and the problem's code, if there is one."""
     method, path = route.split()
     path = path.replace("{name}", "pan").replace("{run_id}", "none").replace("{calibration_id}", "none")
+    path = path.replace("{file}", "page.css")
     url = http.base_url.join(path)
     if method == "WS":
         try:
             async with connect(str(url.copy_with(scheme="ws")), additional_headers=headers) as stream:
+                await stream.send("next")  # which pictures are sent for
                 await stream.recv()
         except InvalidStatus as refused:
             return refused.response.status_code, json.loads(refused.response.body or b"")["code"]

@@ -1,0 +1,52 @@
+"""A daemon in a process of its own, on a small rig, that can be killed and started again under the open page."""
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.daemon.rigs import write_profile
+
+ACTIVECAM = (sys.executable, "-c", "from daemon.cli import main; main()")
+
+
+class Daemon:
+    """`activecam serve` on the small rig; `keys` is whether everybody is asked for one."""
+
+    def __init__(self, folder: Path, *, keys: bool = False, time_scale: float = 4.0) -> None:
+        self._profile = write_profile(folder, time_scale=time_scale)
+        self._data = folder / "data"
+        self._keys = keys
+        self._port = 0
+        self._process: subprocess.Popen[str] | None = None
+        self.address = ""
+
+    def start(self) -> None:
+        """Serve, at the address of before if there was one, and return when requests are answered."""
+        command = [*ACTIVECAM, "serve", "--profile", str(self._profile), "--data", str(self._data)]
+        command += ["--port", str(self._port), *(["--keys"] if self._keys else [])]
+        self._process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        assert self._process.stdout is not None
+        found = re.search(r"(http://[\w.]+:(\d+))/api", self._process.stdout.readline())
+        assert found is not None, "the daemon did not start"
+        self.address, self._port = f"{found[1]}/", int(found[2])
+
+    def kill(self) -> None:
+        """End it as a power cut would."""
+        assert self._process is not None
+        self._process.kill()
+        self._process.communicate()
+
+    def stop(self) -> None:
+        """End it as its user would."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGTERM)
+        self._process.communicate()
+
+    def key(self, role: str) -> str:
+        """Return a new key of `role`."""
+        command = [*ACTIVECAM, "key", "add", role, "--role", role, "--data", str(self._data)]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()

@@ -1,0 +1,173 @@
+"""The page's socket: what the rig does, as it does it, and commands that are requests like any other."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+
+from daemon.api import live_state
+from daemon.api.live_state import LiveState
+from daemon.client_motion import ClientMotions
+from daemon.server import address_of, bind, serving
+from daemon.service import Service
+from tests.daemon.motions import until
+
+
+@pytest.fixture
+async def live(service: Service) -> AsyncIterator[str]:
+    """The socket's address."""
+    listening = bind("127.0.0.1", 0)
+    try:
+        async with serving(service, listening):
+            yield f"{address_of(listening).replace('http', 'ws')}/api/v1/live"
+    finally:
+        listening.close()
+
+
+async def message(socket: ClientConnection, kind: str) -> dict[str, Any]:
+    """Return the next message of a kind."""
+    while True:
+        found: dict[str, Any] = json.loads(await socket.recv())
+        if found["type"] == kind:
+            return found
+
+
+async def state(socket: ClientConnection, fits: Any) -> dict[str, Any]:
+    """Return the next state that fits."""
+    while not fits(found := await message(socket, "state")):
+        pass
+    return found
+
+
+async def ask(socket: ClientConnection, **command: Any) -> dict[str, Any]:
+    await socket.send(json.dumps({"id": 1} | command))
+    return await message(socket, "answer")
+
+
+async def test_the_state_is_told_at_once_and_whenever_it_changes(service: Service, live: str) -> None:
+    async with connect(live) as socket:
+        first = await message(socket, "state")
+        assert (first["rig"]["name"], first["run"], first["problems"]) == ("small-rig", None, [])
+        assert first["you"] == {
+            "key": None,
+            "role": "admin",
+            "may": ["read", "move", "audit"],
+            "holds_lease": False,
+        }
+        service.leases.acquire("anna", "", 30)
+        held = await state(socket, lambda told: told["rig"]["lease"] is not None)
+        assert (held["rig"]["lease"]["owner"], held["you"]["holds_lease"]) == ("anna", False)
+
+
+async def test_a_state_is_made_once_for_all_who_follow(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_state, "PERIOD", 0.01)
+    states = LiveState(service)
+    followers = [aiter(states.follow()) for _ in range(3)]
+    for _ in range(3):
+        told = [await anext(follower) for follower in followers]
+        assert told[0] is told[1] is told[2]
+
+
+async def test_silence_is_broken_before_anybody_takes_it_for_the_end(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_state, "PERIOD", 0.01)
+    monkeypatch.setattr(LiveState, "_differs", lambda *_: False)
+    states = aiter(LiveState(service).follow())
+    first, second = json.loads(await anext(states)), json.loads(await anext(states))
+    assert second["time"] > first["time"]
+
+
+async def test_a_command_is_carried_out_under_the_lease_of_its_socket(service: Service, live: str) -> None:
+    async with connect(live) as socket, connect(live) as other:
+        refused = await ask(other, do="home", axis="pan")
+        assert (refused["status"], refused["problem"]["code"]) == (401, "lease_required")
+        lease = await ask(socket, do="lease", owner="anna", note="looking")
+        assert (lease["status"], lease["body"]["owner"]) == (200, "anna")
+        await state(socket, lambda told: told["you"]["holds_lease"])
+        begun = await ask(socket, do="home", axis="pan")
+        assert (begun["id"], begun["status"], begun["body"]["name"]) == (1, 202, "pan")
+        await state(socket, lambda told: told["rig"]["axes"][1]["homed"])
+        beyond = await ask(socket, do="move", targets={"pan": 99})
+        assert (beyond["status"], beyond["problem"]["code"]) == (422, "limit_exceeded")
+        held = await ask(other, do="lease", owner="ben")
+        assert held["problem"]["code"] == "lease_held"
+        assert (await ask(other, do="lease", owner="ben", take_over=True))["status"] == 200
+        await state(socket, lambda told: not told["you"]["holds_lease"])
+        assert (await ask(other, do="release"))["status"] == 204
+        assert service.leases.current is None
+
+
+async def test_a_stop_waits_for_no_command_before_it(
+    service: Service, live: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin, held = ClientMotions.begin, asyncio.Event()
+
+    async def begin_late(*arguments: Any) -> Any:
+        await held.wait()
+        return await begin(*arguments)
+
+    monkeypatch.setattr(ClientMotions, "begin", begin_late)
+    async with connect(live) as socket:
+        await ask(socket, do="lease", owner="anna")
+        await socket.send(json.dumps({"id": "late", "do": "jog", "axis": "slide", "distance": 50}))
+        stopped = await ask(socket, do="stop")
+        assert (stopped["id"], stopped["status"], stopped["body"]["latched"]) == (1, 200, True)
+        held.set()
+        late = await message(socket, "answer")
+        assert (late["id"], late["problem"]["code"]) == ("late", "stop_latched")
+        assert (await ask(socket, do="acknowledge"))["body"]["latched"] is False
+
+
+async def test_a_lease_ends_with_its_socket_and_so_do_its_motions(service: Service, live: str) -> None:
+    async with connect(live) as socket:
+        await ask(socket, do="lease", owner="anna")
+        await ask(socket, do="jog", axis="slide", distance=90)
+        assert service.rig.axis("slide").moving
+    await until(service.rig, lambda snapshot: not snapshot.axis("slide").moving)
+    assert service.leases.current is None
+    assert (
+        "its lease ended" in str(service.rig.axis("slide").last_error) or service.rig.axis("slide").last_error
+    )
+
+
+async def test_what_is_no_command_is_refused_in_words(live: str) -> None:
+    async with connect(live) as socket:
+        for text, said in (
+            ("no JSON", "Invalid JSON"),
+            ('{"id": 1, "do": "dance"}', "'stop'"),
+            ('{"do": "stop"}', "id"),
+        ):
+            await socket.send(text)
+            refused = await message(socket, "answer")
+            assert (refused["id"], refused["status"], refused["problem"]["code"]) == (
+                None,
+                422,
+                "invalid_request",
+            )
+            assert said in refused["problem"]["detail"]
+        for axis in ("tilt", "../stop", "pan/../../stop"):
+            refused = await ask(socket, do="stop_axis", axis=axis)
+            assert refused["problem"]["code"] in {"unknown_axis", "not_found"}
+        wrong = await ask(socket, do="jog", axis="pan", distance=1, speed=3)
+        assert wrong["problem"]["code"] == "lease_required"  # before its body is looked at, as over HTTP
+
+
+async def test_a_runs_events_come_from_its_first_to_its_last(service: Service, live: str) -> None:
+    async with connect(live) as early:
+        run = await service.runs.start("anna")
+        events = [await message(early, "event")]
+        while events[-1]["event"]["type"] != "finished":
+            events.append(await message(early, "event"))
+    assert [each["event"]["sequence"] for each in events] == list(range(1, len(events) + 1))
+    assert {each["event"]["run_id"] for each in events} == {run.id}
+    async with connect(live) as late:
+        again = [await message(late, "event") for _ in events]
+        over = await state(late, lambda told: told["run"]["state"] == "succeeded")
+    assert again == events
+    assert over["rig"]["run"] is None
