@@ -7,7 +7,7 @@
 `solve` and `verify` are loaded when first used: who only asks for poses does not wait for the solver. The rooms, as
 data flows through them:
 
-    session, targets             what was measured, and of what;  documents, session_writer  on disk
+    session, views, intrinsics, targets   what was measured, by and of what;  documents, session_writer  on disk
     ink                          what is black on a printed target
     picture_file, detection/, observations   the target's points in every picture;  coverage  of the picture by them
     parameters, lens_prior, held_chain           what is known beforehand

@@ -17,20 +17,11 @@ from calib.chain import Chain
 from calib.corrections import Corrections, checked_sides
 from calib.dh import link_transform
 from calib.dh_covariance import DhCovariance, dh_covariance
-from calib.documents import read_json, validate, write_json
+from calib.documents import Document, Number, Positive, read_json, validate, write_json
 from calib.errors import CalibError
 from calib.pose_covariance import CorrectedReadings, PoseTerms, TwistCovariance, pose_terms, twist_covariance
 from calib.projection import lens_by_number, projected, projection_covariances
-from calib.session import (
-    Document,
-    Intrinsics,
-    JointKind,
-    Number,
-    Positive,
-    RigidRows,
-    StoredTarget,
-    WorldOrigin,
-)
+from calib.session import Intrinsics, JointKind, RigidRows, StoredTarget, WorldOrigin
 from calib.stated_corrections import StatedCorrections
 from calib.stated_quality import Quality
 from calib.targets import Target, target_points

@@ -1,15 +1,25 @@
-"""Reading and writing of the two JSON formats: errors that name the field."""
+"""The two JSON formats: what their parts have in common, reading with errors that name the field, and writing."""
 
 import json
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from calib.durable_files import write_durably
 from calib.errors import FormatError
 
 Model = TypeVar("Model", bound=BaseModel)
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Document(BaseModel):
+    """A part of a file: unknown keys are kept, a known one must be right."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
 
 
 def read_json(path: Path) -> Any:

@@ -5,15 +5,12 @@ readings, which are in each joint's own reading unit. Unknown keys are kept.
 """
 
 from collections.abc import Collection, Mapping
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     PlainSerializer,
     PlainValidator,
@@ -23,31 +20,37 @@ from pydantic import (
     model_validator,
 )
 
-from calib.documents import read_json, validate
+from calib.documents import Document, NotNegative, Number, Positive, read_json, validate
 from calib.errors import FormatError
-from calib.parameters import LENS_NAMES, Held, held_value, held_values
+from calib.intrinsics import Intrinsics, IntrinsicsStd, problem_of_std
+from calib.parameters import Held, held_value, held_values
 from calib.targets import Target, target_points
 from calib.units import nominal_scale
+from calib.views import Points, RigidRows, View
+
+__all__ = [
+    "SESSION_FORMAT",
+    "Camera",
+    "DhRow",
+    "Intrinsics",
+    "IntrinsicsStd",
+    "Joint",
+    "JointKind",
+    "Nominal",
+    "NominalStd",
+    "Points",
+    "RigidRows",
+    "Session",
+    "StoredTarget",
+    "View",
+    "WorldOrigin",
+    "load_session",
+    "problem_of_std",
+]
 
 SESSION_FORMAT = "activecam.session/1"
 
 JointKind = Literal["revolute", "prismatic"]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-
-
-def _rigid(rows: list[list[float]]) -> list[list[float]]:
-    matrix = np.array(rows, dtype=float) if all(len(row) == 4 for row in rows) else np.zeros((0, 0))
-    if matrix.shape != (4, 4) or not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
-        raise ValueError("must be a 4 x 4 matrix whose last row is 0 0 0 1")
-    rotation = matrix[:3, :3]
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
-        raise ValueError("must be a rigid transform: its upper left 3 x 3 part is not a rotation")
-    return rows
-
-
-RigidRows = Annotated[list[list[Number]], AfterValidator(_rigid)]
 
 
 def _with_kind(target: Target) -> dict[str, Any]:
@@ -56,65 +59,6 @@ def _with_kind(target: Target) -> dict[str, Any]:
 
 StoredTarget = Annotated[Target, PlainSerializer(_with_kind)]
 """A target that is written with its kind, whether or not that was said when it was made."""
-
-
-class Document(BaseModel):
-    """A part of a file: unknown keys are kept, a known one must be right."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-
-
-class Intrinsics(Document):
-    """A camera's lens: `opencv` (k1 k2 p1 p2 k3) or `division` ([k1] on normalised coordinates)."""
-
-    model: Literal["opencv", "division"]
-    width: Annotated[int, Field(gt=0)] | None = None
-    height: Annotated[int, Field(gt=0)] | None = None
-    fx: Positive
-    fy: Positive
-    cx: Number
-    cy: Number
-    distortion: list[Number]
-
-    @model_validator(mode="after")
-    def _distortion_fits_model(self) -> Self:
-        wanted = len(LENS_NAMES[self.model]) - 4
-        if len(self.distortion) != wanted:
-            raise ValueError(
-                f"distortion of the model '{self.model}' has {wanted} numbers, not {len(self.distortion)}"
-            )
-        return self
-
-    def numbers(self) -> dict[str, float]:
-        """Return the lens's numbers by name."""
-        values = [self.fx, self.fy, self.cx, self.cy, *self.distortion]
-        return dict(zip(LENS_NAMES[self.model], values, strict=True))
-
-
-class IntrinsicsStd(Document):
-    """How well a lens's numbers are known: standard deviations, 0 for what is known exactly."""
-
-    fx: NotNegative = 0.0
-    fy: NotNegative = 0.0
-    cx: NotNegative = 0.0
-    cy: NotNegative = 0.0
-    k1: NotNegative = 0.0
-    k2: NotNegative = 0.0
-    p1: NotNegative = 0.0
-    p2: NotNegative = 0.0
-    k3: NotNegative = 0.0
-
-
-def problem_of_std(known: Intrinsics | None, std: IntrinsicsStd | None) -> str | None:
-    """Return why `std` cannot be how well the lens `known` is known, or None."""
-    if std is None:
-        return None
-    if known is None:
-        return "says how well intrinsics are known, and there are none"
-    lacking = [
-        name for name in IntrinsicsStd.model_fields if name not in known.numbers() and getattr(std, name) > 0
-    ]
-    return f"the model '{known.model}' has no {lacking[0]}" if lacking else None
 
 
 class Joint(Document):
@@ -163,74 +107,6 @@ class Camera(Document):
             return {}
         known = self.intrinsics_std or IntrinsicsStd()
         return {name: getattr(known, name) for name in self.intrinsics.numbers()}
-
-
-class Points(Document):
-    """Target points seen in a view: pictures of the points themselves, or centroids of disks' pictures."""
-
-    ids: list[Annotated[int, Field(ge=0)]]
-    pixels: list[Annotated[list[Number], Field(min_length=2, max_length=2)]]
-    disk: Literal["centroid"] | None = None
-
-    @model_validator(mode="after")
-    def _one_pixel_an_id(self) -> Self:
-        if len(self.ids) != len(self.pixels):
-            raise ValueError(
-                f"has {len(self.ids)} ids but {len(self.pixels)} pixels; give one pixel for each id"
-            )
-        if len(set(self.ids)) != len(self.ids):
-            raise ValueError("an id stands in it twice")
-        return self
-
-
-class View(Document):
-    """One measurement: the readings, and a picture, its detected points, or a camera pose.
-
-    `images` are all frames of a view that took several, its `image` first.
-    """
-
-    joint: str | None
-    readings: list[Number]
-    image: str | None = None
-    images: list[str] | None = None
-    points: Points | None = None
-    world_from_camera: RigidRows | None = None
-    camera: str | None = None
-    use: Literal["fit", "verify", "none"] = "fit"
-    approached: list[Literal[-1, 0, 1]] | None = None
-    sweep: Annotated[int, Field(ge=0)] | None = None
-    """Which sweep of a run's procedure took it, from 0; its free views count as the last."""
-
-    @property
-    def frames(self) -> list[str]:
-        """The paths of the view's pictures, none where it has no picture."""
-        return self.images or ([] if self.image is None else [self.image])
-
-    @field_validator("image")
-    @classmethod
-    def _inside_the_folder(cls, image: str | None) -> str | None:
-        if image is not None and (PurePosixPath(image).is_absolute() or ".." in PurePosixPath(image).parts):
-            raise ValueError(f"'{image}' must be a path inside the session's folder")
-        return image
-
-    @field_validator("images")
-    @classmethod
-    def _all_inside_the_folder(cls, images: list[str] | None) -> list[str] | None:
-        for image in images or []:
-            cls._inside_the_folder(image)
-            if (images or []).count(image) > 1:
-                raise ValueError(f"'{image}' stands twice: each frame has a picture of its own")
-        return images
-
-    @model_validator(mode="after")
-    def _one_measurement(self) -> Self:
-        given = [key for key in ("image", "points", "world_from_camera") if getattr(self, key) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) or "none"
-            raise ValueError(f"must carry one of image, points or world_from_camera, and has {found}")
-        if self.images is not None and self.images[:1] != [self.image]:
-            raise ValueError("images must begin with the view's image, and go on with its further frames")
-        return self
 
 
 class DhRow(Document):

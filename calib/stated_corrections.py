@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from calib.corrections import Backlash, Corrections, Coupling, OncePerTurn
-from calib.session import Document, Number, Positive
+from calib.documents import Document, Number, Positive
 from calib.warp import warp_shapes
 
 Shape = Annotated[str, Field(pattern="^x*y*$", min_length=2, max_length=4)]

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from calib.session import Document, Number
+from calib.documents import Document, Number
 
 
 class ViewQuality(Document):
