@@ -5,8 +5,6 @@ import os
 
 import pytest
 
-from drivers.clock import SystemClock
-from drivers.driver import Cautious, DriverContext
 from drivers.emulators.grbl.machine import Block
 from drivers.errors import (
     DeviceFaultError,
@@ -14,16 +12,10 @@ from drivers.errors import (
     LimitError,
     MotionStoppedError,
     NotHomedError,
-    OptionsError,
 )
 from drivers.grbl import GrblController
-from drivers.grbl.options import GrblAxisOptions, GrblOptions
 from drivers.registry import controller_driver
 from tests.drivers.grbl.benches import (
-    AXES,
-    SLIDE,
-    SLOW_HOMING,
-    SPECS,
     Table,
     homed,
     moving,
@@ -39,12 +31,6 @@ async def fault(table: Table) -> str | None:
 
 def test_profiles_know_it_as_grbl() -> None:
     assert controller_driver("grbl") is GrblController
-
-
-def test_two_axes_of_one_letter_are_refused() -> None:
-    axes = {"slide": AXES["slide"], "pan": GrblAxisOptions(letter="X")}
-    with pytest.raises(OptionsError, match=r"two axes at /dev/ttyX have the same letter"):
-        GrblController.create(SPECS, GrblOptions(port="/dev/ttyX"), axes, DriverContext(SystemClock()))
 
 
 async def test_a_move_is_over_when_the_shaft_stands_and_not_at_its_ok() -> None:
@@ -165,87 +151,6 @@ async def test_an_alarm_that_was_not_heard_is_seen_in_the_reports() -> None:
         assert not (await table.slide.read()).homed
 
 
-async def test_a_motor_that_does_not_turn_is_found_by_homing() -> None:
-    async with opened() as table:
-        table.emulator.stall("slide")
-        with pytest.raises(DeviceFaultError, match=r"alarm 9: homing did not find the limit switch"):
-            await table.slide.home()
-        assert not (await table.slide.read()).homed
-
-
-async def test_homing_that_is_stopped_leaves_the_axes_unhomed_and_without_alarm() -> None:
-    async with homed() as table:
-        table.emulator.settings.update(SLOW_HOMING)
-        homing = asyncio.create_task(table.slide.home())
-        await moving(table)
-        await table.slide.stop()
-        with pytest.raises(MotionStoppedError, match=r"'slide' was stopped on its way to its home"):
-            await homing
-        stood = table.shaft()
-        state = await table.slide.read()
-        assert (state.moving, state.homed, state.fault) == (False, False, None)
-        await asyncio.sleep(0.1)
-        assert table.shaft() == stood
-        await table.slide.home()
-
-
-async def test_homing_says_that_it_moves_and_knows_no_position() -> None:
-    async with homed() as table:
-        table.emulator.settings.update(SLOW_HOMING)
-        homing = asyncio.create_task(table.slide.home())
-        await moving(table)
-        for axis in (table.slide, table.pan):  # without single-axis homing all of them are homed
-            state = await axis.read()
-            assert (state.moving, state.homed, state.position) == (True, False, None)
-        await homing
-
-
-async def test_reading_on_and_on_does_not_take_homing_for_a_loss() -> None:
-    """Grbl answers no question until it is homed, not even one that came just before."""
-    async with opened({24: 60}, answer_timeout="300 ms") as table:
-
-        async def read_on() -> None:
-            while True:
-                await table.pan.read()
-                await asyncio.sleep(0.001)
-
-        reading = asyncio.create_task(read_on())
-        began = asyncio.get_running_loop().time()
-        await table.slide.home()
-        assert asyncio.get_running_loop().time() - began > 0.3, "it was homed before anybody could miss it"
-        assert not reading.done()
-        reading.cancel()
-
-
-async def test_homing_that_is_stopped_before_it_is_sent_does_not_begin() -> None:
-    async with opened(report_interval="200 ms") as table:
-        before = table.shaft()
-        homing = asyncio.create_task(table.slide.home())
-        await until(lambda: table.slide._machine.homing is not None)
-        await table.slide.stop()
-        with pytest.raises(MotionStoppedError):
-            await homing
-        await asyncio.sleep(0.1)
-        assert table.shaft() == before
-
-
-async def test_all_axes_are_homed_at_once_and_not_once_more_for_the_second() -> None:
-    async with opened() as table:
-        await asyncio.gather(table.slide.home(), table.pan.home())
-        assert ((await table.slide.read()).homed, (await table.pan.read()).homed) == (True, True)
-        assert table.slide._machine.homings == 1
-        await table.pan.home()
-        assert table.slide._machine.homings == 2
-
-
-async def test_axes_are_homed_one_by_one_where_the_firmware_can() -> None:
-    async with opened(single_axis_homing=True) as table:
-        before = table.shaft()
-        await table.pan.home()
-        assert table.shaft() == before
-        assert ((await table.slide.read()).homed, (await table.pan.read()).homed) == (False, True)
-
-
 async def test_axes_move_one_after_the_other() -> None:
     async with homed() as table:
         moves = asyncio.gather(table.slide.move(50.0), table.pan.move(30.0))
@@ -315,35 +220,6 @@ async def test_positions_in_work_coordinates_are_turned_into_the_machines() -> N
         assert (await table.pan.read()).position == pytest.approx(40.0, abs=1e-3)
 
 
-async def test_settings_that_do_not_fit_are_all_told_at_once_and_nothing_moves() -> None:
-    async with plugged({1: 25, 100: 200.0}) as table:
-        before = table.shaft()
-        with pytest.raises(
-            DeviceFaultError, match=r"is not set as the profile needs: its motors .*; axis 'slide'"
-        ):
-            await table.controller.open()
-        with pytest.raises(DeviceLostError):
-            await table.slide.read()
-        assert table.shaft() == before
-
-
-async def test_soft_limits_that_are_off_are_worth_a_warning() -> None:
-    async with opened({20: 0}) as table:
-        assert isinstance(table.controller, Cautious)
-        assert "soft limits are off ($20=0)" in table.controller.warnings[0]
-    async with opened() as table:
-        assert table.controller.warnings == []
-
-
-async def test_an_axis_that_the_controller_has_not_is_named() -> None:
-    axes = {"slide": GrblAxisOptions(letter="C", machine_zero="60.5 mm")}
-    async with plugged(specs={"slide": SLIDE}, axes=axes) as table:
-        with pytest.raises(
-            DeviceFaultError, match=r"reports no position of 'slide' \(C\): check their 'letter'"
-        ):
-            await table.controller.open()
-
-
 async def test_power_loss_leaves_the_position_unknown_and_the_name_may_change() -> None:
     async with homed() as table:
         move = asyncio.create_task(table.slide.move(55.0))
@@ -368,59 +244,6 @@ async def test_power_loss_leaves_the_position_unknown_and_the_name_may_change() 
         await table.slide.move(20.0)
         for file in occupied:
             os.close(file)
-
-
-async def test_a_second_program_is_kept_out() -> None:
-    async with opened() as table:
-        other = GrblController.create(
-            SPECS, GrblOptions(port=str(table.emulator.port.path)), AXES, DriverContext(SystemClock())
-        )
-        with pytest.raises(
-            DeviceLostError, match=r"another program has the port .* open: close that program"
-        ):
-            await other.open()
-        await other.close()
-
-
-async def test_what_does_not_say_that_it_is_grbl_is_not_moved() -> None:
-    async with plugged(start_timeout="300 ms") as table:
-        table.emulator.mute()
-        with pytest.raises(DeviceLostError, match=r"nothing at .* says that it is Grbl: check .* power"):
-            await table.controller.open()
-        table.emulator.repair()
-        table.emulator.garble()
-        with pytest.raises(
-            DeviceLostError, match=r"does not speak as Grbl does: check the port and 'baud_rate'"
-        ):
-            await table.controller.open()
-        table.emulator.repair()
-        await table.controller.open()
-
-
-async def test_opening_ends_what_an_earlier_program_has_begun() -> None:
-    async with plugged() as table:
-        machine = table.emulator.firmware.machine
-        table.emulator.firmware.receive(b"$X\n")
-        await until(lambda: table.emulator.firmware.state == "Idle")
-        await machine.plan(Block((-20.0, 0.0, 0.0), 600.0, jog=False))
-        await moving(table)
-        await table.controller.open()
-        before = table.shaft()
-        state = await table.slide.read()
-        assert (state.moving, state.homed) == (False, False)
-        assert table.shaft() == before
-
-
-async def test_opening_that_is_cancelled_lets_the_port_go() -> None:
-    async with plugged(start_timeout="20 s") as table:
-        table.emulator.mute()
-        opening = asyncio.create_task(table.controller.open())
-        await asyncio.sleep(0.1)
-        opening.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await opening
-        table.emulator.repair()
-        await table.controller.open()
 
 
 async def test_questions_at_the_same_time_share_an_answer_and_keep_their_pace() -> None:

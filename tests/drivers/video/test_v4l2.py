@@ -4,58 +4,21 @@ import asyncio
 import os
 import threading
 import time
-from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 import cv2
 import pytest
 
-from drivers.camera import CameraSpec
 from drivers.clock import ScaledClock, SystemClock
 from drivers.contract import CameraBench, CameraContract
-from drivers.driver import Cautious, DriverContext
+from drivers.driver import DriverContext
 from drivers.errors import DeviceLostError, DeviceTimeoutError, OptionsError
 from drivers.video import grabber
-from drivers.video.camera import VideoCamera
 from drivers.video.options import V4l2Options
 from drivers.video.v4l2 import V4l2Camera, V4l2Source
-from drivers.video.v4l2_node import Control, control_name
+from drivers.video.v4l2_node import control_name
 from tests.drivers.video.captures import WEBCAM, FakeCapture, FakeNode
-
-SPEC = CameraSpec("eye", 64, 48)
-
-
-class Rig:
-    """A camera, the fake device behind it, and how often it was opened."""
-
-    def __init__(
-        self,
-        capture: FakeCapture | None = None,
-        node: FakeNode | None = None,
-        spec: CameraSpec = SPEC,
-        **options: Any,
-    ) -> None:
-        self.capture = FakeCapture() if capture is None else capture
-        self.node = FakeNode(WEBCAM) if node is None else node
-        self.opened = 0
-        whole = {"device": "/dev/null", "timeout": "1 s", "latency": "1 ms", "exposure": "5 ms"} | options
-        self.options = V4l2Options.model_validate(whole)
-        source = V4l2Source(spec, self.options, lambda _camera, _device: self.node, self._open)
-        self.camera = VideoCamera(spec, source, SystemClock(), self.options.timeout)
-
-    def _open(self, device: str) -> FakeCapture:
-        self.opened += 1
-        return self.capture.reopened()
-
-    @asynccontextmanager
-    async def open(self) -> AsyncIterator[VideoCamera]:
-        await self.camera.open()
-        try:
-            yield self.camera
-        finally:
-            await self.camera.close()
+from tests.drivers.video.v4l2_rigs import SPEC, Rig
 
 
 class TestV4l2Contract(CameraContract):
@@ -275,116 +238,6 @@ async def test_opencv_is_kept_from_waiting_ten_seconds_for_a_frame(monkeypatch: 
     source.open()
     source.close()
     assert seen == ["1"]
-
-
-# What is set is read back.
-
-
-async def test_a_width_alone_does_nothing_so_that_the_height_is_set_after_it() -> None:
-    rig = Rig(spec=CameraSpec("eye", 1280, 720))
-    async with rig.open() as camera:
-        assert (await camera.frame()).image.shape == (720, 1280, 3)
-
-
-async def test_a_size_that_the_camera_does_not_have_is_an_error() -> None:
-    rig = Rig(spec=CameraSpec("eye", 999, 720))
-    with pytest.raises(OptionsError, match=r"gives pictures of 1280 x 720 and was asked for 999 x 720"):
-        await rig.camera.open()
-
-
-async def test_rate_format_and_buffers_that_are_not_obeyed_are_told_of() -> None:
-    rig = Rig(frame_rate="50 Hz", pixel_format="MJPG", buffers=1)
-    rig.capture.obeys_rate = rig.capture.obeys_format = rig.capture.obeys_buffers = False
-    async with rig.open() as camera:
-        warnings = list(camera.warnings)
-    assert [warning.split(": ")[0] for warning in warnings] == [
-        "camera 'eye' gives pictures as YUYV and was asked for MJPG",
-        "camera 'eye' gives 100 frames a second and was asked for 50",
-        "camera 'eye' keeps 4 frames waiting and was asked for 1",
-    ]
-
-
-async def test_nothing_is_told_of_a_camera_that_obeys() -> None:
-    rig = Rig(frame_rate="50 Hz", pixel_format="MJPG", buffers=1, controls={"gain": 12})
-    async with rig.open() as camera:
-        assert isinstance(camera, Cautious)
-        assert list(camera.warnings) == []
-    assert rig.capture.rate == 50.0
-    assert rig.node.values["gain"] == 12
-
-
-async def test_what_the_camera_does_by_itself_is_switched_off_before_anything_is_set() -> None:
-    rig = Rig(exposure="8 ms", controls={"focus_absolute": 40})
-    async with rig.open() as camera:
-        assert (await camera.frame()).exposure == pytest.approx(0.008)
-    values = rig.node.values
-    assert values["auto_exposure"] == 1
-    assert values["exposure_time_absolute"] == 80
-    assert values["focus_automatic_continuous"] == values["white_balance_automatic"] == 0
-    assert values["focus_absolute"] == 40
-    switches = ("auto_exposure", "focus_automatic_continuous", "white_balance_automatic")
-    assert sorted(rig.node.order[:3]) == sorted(switches)
-
-
-@pytest.mark.parametrize(
-    ("name", "sentence"),
-    [
-        ("auto_exposure", "sets its exposure by itself"),
-        ("focus_automatic_continuous", "focuses by itself, which moves the lens that is being calibrated"),
-        ("white_balance_automatic", "sets its white balance by itself"),
-    ],
-)
-async def test_what_cannot_be_switched_off_is_told_of(name: str, sentence: str) -> None:
-    rig = Rig()
-    rig.node.stuck.add(name)
-    async with rig.open() as camera:
-        warnings = list(camera.warnings)
-    assert len(warnings) == 1
-    assert sentence in warnings[0]
-    assert f"cannot be kept from it ({name})" in warnings[0]
-
-
-async def test_automatic_gain_cannot_be_switched_off() -> None:
-    gain = {"gain_automatic": (Control(0x00980912, "gain_automatic", 0, 1, 1), 1)}
-    rig = Rig(node=FakeNode(gain | WEBCAM))
-    rig.node.failing.add("gain_automatic")
-    async with rig.open() as camera:
-        assert ["gain by itself" in warning for warning in camera.warnings] == [True]
-
-
-async def test_what_the_profile_leaves_on_is_told_of() -> None:
-    rig = Rig(exposure=None, controls={"auto_exposure": 3})
-    async with rig.open() as camera:
-        assert list(camera.warnings) == [
-            "camera 'eye' sets its exposure by itself, so that pictures are blurred and bright as it likes, "
-            "as the profile asks (auto_exposure)"
-        ]
-
-
-async def test_a_control_that_is_not_obeyed_is_told_of() -> None:
-    rig = Rig(controls={"gain": 12})
-    rig.node.stuck.add("gain")
-    async with rig.open() as camera:
-        assert "camera 'eye' has gain at 30 and was asked for 12" in camera.warnings[0]
-
-
-@pytest.mark.parametrize(
-    ("controls", "message"),
-    [
-        ({"gain": 300}, r"cannot have gain at 300: its range is 0 to 255"),
-        ({"zoom": 1}, r"has no control 'zoom': it has auto_exposure, exposure_time_absolute, gain"),
-    ],
-)
-async def test_a_control_that_would_be_clamped_or_is_not_there_is_an_error(
-    controls: Mapping[str, int], message: str
-) -> None:
-    rig = Rig(controls=controls)
-    with pytest.raises(OptionsError, match=message):
-        await rig.camera.open()
-    assert rig.capture.released == rig.node.closed == 1
-
-
-# The device node.
 
 
 async def test_a_camera_that_is_not_there_is_lost() -> None:
