@@ -154,6 +154,7 @@ class ControllerOwner(DeviceOwner):
             self._publish()
 
     async def _act(self, name: str, action: Action) -> None:
+        self._latch.require_free()  # a stop since the motion was asked for is only on its way to the device
         record = self._axes[name]
         began, side = record.state, record.approached
         record.approached = 0

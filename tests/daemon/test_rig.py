@@ -2,7 +2,7 @@
 
 import asyncio
 from pathlib import Path
-from typing import cast
+from typing import Literal, cast
 
 import pytest
 
@@ -145,6 +145,20 @@ class TestASlowRig:
         rig.acknowledge_stop()
         await rig.move({"pan": 1.0})
 
+    @pytest.mark.parametrize("turns", range(6))
+    async def test_nothing_begins_once_a_stop_was_asked_for(self, rig: Rig, turns: int) -> None:
+        await home_all(rig)
+        move = asyncio.create_task(rig.move({"slide": 80.0}))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        assert rig.world is not None
+        shaft = rig.world.shaft("slide")[1]
+        before = shaft.motion
+        await rig.stop("a test")
+        with pytest.raises((MotionStoppedError, StopLatchedError)):
+            await move
+        assert shaft.motion is before or before.target == 80.0
+
     async def test_a_stop_outlives_the_task_that_asked_for_it(
         self, rig: Rig, moving: "asyncio.Task[None]"
     ) -> None:
@@ -192,11 +206,14 @@ class TestASlowRig:
         assert 0.0 < (first.axis("slide").position or 0.0) < 100.0
 
 
+@pytest.mark.parametrize(
+    "fault", ["lost", "mute"]
+)  # a mute one still knows, or believes to know, where it is
 async def test_a_lost_device_is_stated_and_its_axes_are_unhomed_when_it_is_back(
-    rig: Rig, devices: Devices
+    rig: Rig, devices: Devices, fault: Literal["lost", "mute"]
 ) -> None:
     await home_all(rig)
-    controller(devices, "stage").inject("lost")
+    controller(devices, "stage").inject(fault)
     snapshot = await until(rig, lambda snapshot: snapshot.axis("slide").lost is not None)
     assert "controller 'stage' is lost" in (snapshot.axis("slide").lost or "")
     assert snapshot.axis("pan").lost is None
