@@ -119,11 +119,10 @@ class Run:
         await finish(self._conclude(state, error, conclusion))
 
     async def _checkpoint(self) -> None:
-        if not self._gate.closed:
-            return
-        await self._change(RunState.PAUSED)
-        await self._gate.wait_open()
-        await self._change(RunState.RUNNING)
+        while self._gate.closed:  # again, where it was paused while that it goes on was being stored
+            await self._change(RunState.PAUSED)
+            await self._gate.wait_open()
+            await self._change(RunState.RUNNING)
 
     async def _change(self, state: RunState) -> None:
         self.record = await self._store.change_run(self.record.id, state)

@@ -151,6 +151,20 @@ async def test_a_paused_run_rests_between_two_views_and_goes_on(service: Service
     assert (await service.runs.get(run.id)).state is RunState.SUCCEEDED
 
 
+async def test_a_run_that_is_paused_again_at_once_rests_where_it_rested(service: Service) -> None:
+    run = await service.runs.start()
+    service.runs.pause(run.id)
+    seen: list[RunEvent] = []
+    async for event in service.runs.events(run.id):
+        seen.append(event)
+        if event.type == "state" and event.state is RunState.PAUSED:
+            if len(of(seen, "state")) > 2:
+                break
+            await service.runs.resume(run.id)
+            service.runs.pause(run.id)
+    assert [event.type for event in seen[-2:]] == ["state", "state"]
+
+
 async def test_a_paused_run_can_be_cancelled(service: Service) -> None:
     run = await service.runs.start()
     service.runs.pause(run.id)
