@@ -6,6 +6,7 @@ import pytest
 
 from daemon.errors import LeaseEndedError, LeaseHeldError, LeaseRequiredError
 from daemon.lease import Lease, LeaseDesk
+from daemon.service import Service
 
 
 @pytest.fixture
@@ -86,3 +87,11 @@ async def test_a_run_takes_its_starters(desk: LeaseDesk, ended: list[Lease]) -> 
     assert ended == [mine]
     with pytest.raises(LeaseHeldError):
         desk.require(mine.token)
+
+
+async def test_nothing_begins_under_one_that_is_over(service: Service) -> None:
+    lease = service.leases.acquire("anna", "", 30.0)
+    service.leases.release(lease.token)
+    with pytest.raises(LeaseEndedError):
+        await service.motions.begin(lease, ["slide"], service.rig.jog("slide", 1.0))
+    assert not service.rig.snapshot.moving

@@ -77,6 +77,14 @@ async def test_a_run_goes_on_after_the_last_sweep_that_it_finished(profile: Prof
     assert [event.position for event in of(again, "view")] == list(range(done + 1, 11))
 
 
+async def test_going_on_homes_axes_that_say_they_are_homed(service: Service) -> None:
+    before = await cut_off(service, 6)
+    assert all(axis.homed for axis in service.rig.snapshot.axes)
+    run, events = await finish(service, await service.runs.resume(before.id))
+    assert run.state is RunState.SUCCEEDED
+    assert [event.axis for event in of(events, "homing")] == ["slide", "pan", "slide", "pan"]
+
+
 async def test_a_run_that_measured_everything_is_solved_without_a_move(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,18 @@ def test_a_role_may_what_those_before_it_may() -> None:
     ]
 
 
+def test_whoever_is_no_operator_may_only_read() -> None:
+    others = {route for route, role in ALL.items() if role in {None, Role.VIEWER}}
+    assert {route.replace("/api/v1", "") for route in others if not route.startswith("GET ")} == {
+        "POST /pose",
+        "POST /project",
+        "POST /rays",
+        "WS /pose/stream",
+        "POST /session",
+        "DELETE /session",
+    }
+
+
 async def state(service: Service) -> tuple[object, ...]:
     return (
         service.leases.current,
