@@ -62,6 +62,8 @@ steering = st.builds(
 activations = st.builds(
     lambda which: Request("POST", "/calibrations/{calibration}/activate", which=which), st.integers(0, 2)
 )
+keyed = st.one_of(leases, releases, motions, starts)
+"""Requests that are carried out once where they have a key, however often they are sent."""
 reading = st.sampled_from(
     [Request("GET", path) for path in ("/pose", "/rig", "/health", "/runs", "/calibrations", "/runs/{run}")]
 )

@@ -6,9 +6,11 @@ import functools
 import tempfile
 from collections.abc import Awaitable, Coroutine
 from contextvars import copy_context
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 from unittest import mock
+from uuid import uuid4
 
 import httpx
 from hypothesis import settings
@@ -23,7 +25,7 @@ from daemon.service import Service, running_service
 from tests.daemon.calibrations import calibration_of
 from tests.daemon.fuzz.adversary import Adversary
 from tests.daemon.fuzz.effort import effort
-from tests.daemon.fuzz.requests import Request, anything
+from tests.daemon.fuzz.requests import CLIENTS, Request, anything, keyed, motions, ttls
 from tests.daemon.fuzz.virtual_time import LoopClock, VirtualTimeLoop
 from tests.daemon.fuzz.watch import SHOWN, Watch
 from tests.daemon.motions import until
@@ -39,6 +41,8 @@ FAULTS = [
     *(f"camera {fault}" for fault in ("lost", "frozen", "late", "repeats")),
     *(f"{what} full{how}" for what in ("disk", "database") for how in ("", " once")),
 ]
+OF_POINTS = "of points"
+"""The calibration that there is before any run has found one."""
 EVENTS = ["homing", "joint", "moving", "view", "state", "solving", "solved", "finished"]
 
 
@@ -69,11 +73,11 @@ class Clients(RuleBasedStateMachine):
         self._service: Service = await self._open.enter_async_context(
             running_service(self._profile, data, self._adversary.devices)
         )
-        self._watch = Watch(self._service, self._adversary)
+        self._watch = Watch(self._service, self._adversary, data / "sessions")
         world = self._service.rig.world
         assert world is not None
         if self._service.poses.calibration_id is None:
-            self._service.poses.activate(self._service.poses.prepare("of points", _calibration()))
+            self._service.poses.activate(self._service.poses.prepare(OF_POINTS, _calibration()))
         for name in self._service.rig.specs:
             self._watch.sees(name, world.shaft(name)[1])
         transport = httpx.ASGITransport(create_app(self._service))
@@ -113,19 +117,45 @@ class Clients(RuleBasedStateMachine):
         """Wait until the run, if there is one, has told something, or a few seconds."""
         self._run(self._follow(kind, count))
 
-    @rule(resumed=st.booleans(), seconds=st.sampled_from([0.0, 0.3, 1.0, 2.0, 4.0]))
-    def begin_a_run(self, resumed: bool, seconds: float) -> None:
+    @rule(
+        resumed=st.booleans(),
+        fault=st.sampled_from([None, None, *FAULTS]),
+        seconds=st.sampled_from([0.0, 0.3, 1.0, 2.0, 4.0]),
+    )
+    def begin_a_run(self, resumed: bool, fault: str | None, seconds: float) -> None:
         """Bring about all that a run needs, which chance hardly does, and let it go on for a while."""
-        self._adversary.repair()
-        self._run(self._begin_a_run(resumed, seconds))
+        self._run(self._begin_a_run(resumed, fault, seconds))
+
+    @rule(
+        who=st.sampled_from(CLIENTS),
+        ttl=ttls,
+        homed=st.booleans(),
+        motion=motions,
+        then=st.lists(anything, max_size=2),
+        turns=st.integers(0, 8),
+    )
+    def set_in_motion(
+        self, who: str, ttl: float, homed: bool, motion: Request, then: list[Request], turns: int
+    ) -> None:
+        """Bring about all that a client's motion needs, and ask for more while it begins."""
+        self._run(self._set_in_motion(who, ttl, homed, [replace(motion, shows=who), *then], turns))
+
+    @rule(request=keyed, at_once=st.booleans())
+    def ask_again(self, request: Request, at_once: bool) -> None:
+        """Ask for one thing twice, as a client does that has heard no answer."""
+        self._run(self._ask_again(request, at_once))
 
     @rule()
     def restart(self) -> None:
         self._adversary.repair()  # it would say that it cannot use its database
         self._run(self._end())
+        before = self._service.poses.calibration_id
         self._tokens.clear()
         self._waiting.clear()
         self._run(self._begin())
+        if before != OF_POINTS:
+            assert self._service.poses.calibration_id == before, "another calibration is active"
+        self._watch.runs.found(self._run(self._http.get("/runs")).json())
 
     @invariant()
     def all_holds(self) -> None:
@@ -155,22 +185,48 @@ class Clients(RuleBasedStateMachine):
             await in_time(asyncio.gather(*tasks), str(requests))
 
     async def _answered(self, request: Request) -> None:
-        headers = {}
-        if request.shows is not None and (token := self._tokens.get(request.shows)) is not None:
-            SHOWN.set(token)
-            headers["X-Lease"] = token
-        path = await self._named(request)
-        answer = await self._http.request(
+        await self._send(request, await self._worded(request))
+
+    async def _worded(self, request: Request) -> httpx.Request:
+        """Return the request as it is sent now, with the token that its client has."""
+        token = None if request.shows is None else self._tokens.get(request.shows)
+        return self._http.build_request(
             request.method,
-            path,
+            await self._named(request),
             json=request.body,
-            headers=headers,
+            headers={} if token is None else {"X-Lease": token},
             params={"wait": "true"} if request.waits else {},
         )
+
+    async def _send(self, request: Request, worded: httpx.Request) -> httpx.Response:
+        SHOWN.set(worded.headers.get("X-Lease"))
+        problems = self._service.rig.snapshot.problems
+        answer = await self._http.send(worded)
         assert answer.status_code < 500 or answer.status_code == 503, answer.text
-        if path == "/lease" and answer.status_code == 200:
+        done = request.method, request.path, answer.status_code
+        if done == ("POST", "/lease", 200):
             assert request.shows is not None
             self._tokens[request.shows] = answer.json()["token"]
+        if done == ("POST", "/runs", 202) and not answer.headers.get("Idempotency-Replayed"):
+            self._watch.runs.started(problems)
+        return answer
+
+    async def _ask_again(self, request: Request, at_once: bool) -> None:
+        worded = await self._worded(request)
+        worded.headers["Idempotency-Key"] = uuid4().hex
+        first = asyncio.create_task(self._send(request, worded))
+        if not at_once:
+            await in_time(asyncio.wait([first]), str(request))
+        again = asyncio.create_task(self._send(request, worded))
+        await in_time(asyncio.wait([first, again]), str(request))
+        answer, replayed = first.result(), again.result()
+        if answer.status_code == 503:  # perhaps before the key was noted
+            return
+        if not replayed.headers.get("Idempotency-Replayed"):
+            assert at_once, f"{request} was carried out again"
+            assert replayed.json()["code"] == "idempotency_in_progress"
+        else:
+            assert (replayed.status_code, replayed.content) == (answer.status_code, answer.content)
 
     async def _named(self, request: Request) -> str:
         """Return the path with the ids of what there is, as far as the database tells."""
@@ -196,10 +252,33 @@ class Clients(RuleBasedStateMachine):
                     if not count:
                         return
 
-    async def _begin_a_run(self, resumed: bool, seconds: float) -> None:
-        await self._ask([Request("POST", "/stop"), Request("POST", "/stop/acknowledge")], 0)
+    async def _make_sound(self) -> None:
+        """Undo all that keeps the rig from moving."""
+        self._adversary.repair()
+        for path in ("/stop", "/stop/acknowledge"):
+            await self._ask([Request("POST", path)], 0)
         sound = until(self._service.rig, lambda snapshot: not snapshot.problems)
         await in_time(sound, "a device's coming back")
+
+    async def _set_in_motion(
+        self, who: str, ttl: float, homed: bool, requests: list[Request], turns: int
+    ) -> None:
+        await self._make_sound()
+        lease = {"owner": who, "ttl_s": ttl, "take_over": True}
+        if homed:
+            await self._ask([Request("POST", "/lease", lease | {"ttl_s": 60.0}, who)], 0)
+            homings = [Request("POST", f"/axes/{name}/home", None, who) for name in self._service.rig.specs]
+            await self._ask(homings, 0)
+            standing = until(self._service.rig, lambda snapshot: not snapshot.moving)
+            await in_time(standing, "homing")
+        await self._ask([Request("POST", "/lease", lease, who)], 0)
+        await self._ask(requests, turns)
+
+    async def _begin_a_run(self, resumed: bool, fault: str | None, seconds: float) -> None:
+        await self._make_sound()
+        if fault is not None:
+            self._adversary.faults[fault]()
+            await asyncio.sleep(seconds)
         await self._ask([Request("POST", "/runs/{run}/resume" if resumed else "/runs", shows="anna")], 0)
         await asyncio.sleep(seconds)
 
@@ -210,15 +289,15 @@ class Clients(RuleBasedStateMachine):
         answer = await self._http.get("/runs")
         if answer.status_code != 200:
             return
-        self._watch.runs(answer.json())
+        self._watch.runs.listed(answer.json())
         if answer.json():
             newest = answer.json()[0]
             active = self._service.runs.active
-            self._watch.kept(self._folder_of(newest["id"]), under_way=active is not None)
+            self._watch.runs.kept(self._folder_of(newest["id"]), under_way=active is not None)
 
     def _look_at_disk(self) -> None:
         for folder in (Path(self._folder.name) / "data" / "sessions").glob("*"):
-            self._watch.kept(folder, under_way=False)
+            self._watch.runs.kept(folder, under_way=False)
 
     def _folder_of(self, run: str) -> Path:
         return Path(self._folder.name) / "data" / "sessions" / run
