@@ -14,6 +14,7 @@ from daemon.api import (
     camera_live,
     exports,
     health,
+    judging,
     lease,
     live,
     metrics,
@@ -36,7 +37,7 @@ from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
 from daemon.service import Service
 
-API_VERSION: Final = "1.3.0"
+API_VERSION: Final = "1.4.0"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
@@ -100,6 +101,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
         plan,
         runs,
         views,
+        judging,
         calibrations,
         exports,
         session,

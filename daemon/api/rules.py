@@ -55,6 +55,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "GET /calibrations/{calibration_id}": VIEWER,
     "GET /calibrations/{calibration_id}/exports": VIEWER,
     "GET /calibrations/{calibration_id}/exports/{name}": VIEWER,
+    "GET /calibrations/{calibration_id}/residuals": VIEWER,
+    "GET /calibrations/{calibration_id}/tables": VIEWER,
     "POST /calibrations/{calibration_id}/activate": OPERATOR,
     "GET /session": VIEWER,
     "POST /session": VIEWER,

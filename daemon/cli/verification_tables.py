@@ -3,30 +3,24 @@
 from itertools import zip_longest
 from math import degrees
 
-import numpy as np
 from rich.table import Table
 
 from calib import paper
-from calib.verification import JointTravel, Travel, Verification, ViewVerdict
+from calib.paper_tables import PredictionTable, TravelRow, TravelTable, prediction_tables, travel_tables
+from calib.verification import Verification
 from daemon.cli.console import output
-
-POSITIONS = 5
-"""How many positions tables 3 and 4 have."""
 
 
 def print_verification(verdict: Verification) -> None:
     """Print method 1 and method 2, each beside the paper's figures, and the verdict over all views."""
-    for travel in verdict.travel:
+    for travel in travel_tables(verdict):
         output.print(travel_table(travel))
-    for joint in dict.fromkeys(travel.joint for travel in verdict.travel):
-        kind = next(travel.kind for travel in verdict.travel if travel.joint == joint)
-        seen = [view for view in verdict.per_view if view.joint == joint and view.mean_px is not None]
-        if seen:
-            output.print(prediction_table(joint, kind, seen))
+    for predictions in prediction_tables(verdict):
+        output.print(prediction_table(predictions))
     output.print(summary(verdict), soft_wrap=True)
 
 
-def travel_table(travel: JointTravel) -> Table:
+def travel_table(travel: TravelTable) -> Table:
     """Return method 1 of one joint: how far it moved, predicted against measured (tables 1 and 2)."""
     straight = travel.kind == "prismatic"
     unit, coarse = ("mm", "mm") if straight else ("mrad", "deg")
@@ -35,9 +29,8 @@ def travel_table(travel: JointTravel) -> Table:
         if straight
         else zip(paper.ROTATION_RAD, paper.ROTATION_ERROR_RAD, paper.ROTATION_PERCENT, strict=True)
     )
-    number = 1 if straight else 2
     table = Table(
-        title=f"Method 1, joint '{travel.joint}': predicted against measured travel (paper: table {number})",
+        title=f"Method 1, joint '{travel.joint}': predicted against measured travel (paper: table {travel.number})",
         title_justify="left",
     )
     trusted = any(row.encoder is not None for row in travel.rows)
@@ -54,17 +47,17 @@ def travel_table(travel: JointTravel) -> Table:
         cells = _travel_cells(row, straight, trusted)
         if reported is not None:
             distance, error, percent = reported
-            cells += [_travelled(distance, straight), f"{1e3 * error:.4f}", f"{percent:.4f}"]
+            cells += [_travelled(distance, straight), *_error_cells(error, percent)]
         table.add_row(*cells)
     return table
 
 
-def _travel_cells(row: Travel | None, straight: bool, trusted: bool) -> list[str]:
+def _travel_cells(row: TravelRow | None, straight: bool, trusted: bool) -> list[str]:
     if row is None:
         return [""] * (5 if trusted else 3)
-    cells = [_travelled(row.predicted, straight), *_error_cells(row.predicted, row.measured)]
+    cells = [_travelled(row.predicted, straight), *_error_cells(row.error, row.percent)]
     if trusted:
-        cells += ["", ""] if row.encoder is None else _error_cells(row.predicted, row.encoder)
+        cells += _error_cells(row.encoder_error, row.encoder_percent)
     return cells
 
 
@@ -72,15 +65,14 @@ def _travelled(travel: float, straight: bool) -> str:
     return f"{1e3 * travel:.1f}" if straight else f"{degrees(travel):.2f}"
 
 
-def _error_cells(predicted: float, measured: float) -> list[str]:
-    """Return the error in mm or mrad, and in percent."""
-    error = abs(predicted - measured)
-    return [f"{1e3 * error:.4f}", f"{100 * error / abs(measured):.4f}" if measured else ""]
+def _error_cells(error: float | None, percent: float | None) -> list[str]:
+    """Return an error in mm or mrad, and in percent."""
+    return ["" if error is None else f"{1e3 * error:.4f}", "" if percent is None else f"{percent:.4f}"]
 
 
-def prediction_table(joint: str, kind: str, views: list[ViewVerdict]) -> Table:
+def prediction_table(predictions: PredictionTable) -> Table:
     """Return method 2 for one joint: predicted against measured image points (tables 3 and 4)."""
-    number = 3 if kind == "prismatic" else 4
+    joint, number = predictions.joint, predictions.number
     theirs = paper.PREDICTION_AFTER_TRANSLATION_PX if number == 3 else paper.PREDICTION_AFTER_ROTATION_PX
     table = Table(
         title=f"Method 2, joint '{joint}': predicted against measured image points (paper: table {number})",
@@ -89,15 +81,13 @@ def prediction_table(joint: str, kind: str, views: list[ViewVerdict]) -> Table:
     for heading in ("readings", "points", "mean error (px)"):
         table.add_column(heading, justify="right")
     table.add_column("paper (px)", justify="right", style="dim")
-    chosen = np.unique(np.linspace(0, len(views) - 1, min(POSITIONS, len(views))).round().astype(int))
-    for index, reported in zip_longest(chosen, theirs):
+    for row, reported in zip_longest(predictions.rows, theirs):
         reference = "" if reported is None else f"{reported:.3f}"
-        if index is None:
+        if row is None:
             table.add_row("", "", "", reference)
             continue
-        view = views[int(index)]
-        readings = "  ".join(f"{reading:.2f}" for reading in view.readings)
-        table.add_row(readings, str(view.points), f"{view.mean_px:.3f}", reference)
+        readings = "  ".join(f"{reading:.2f}" for reading in row.readings)
+        table.add_row(readings, str(row.points), f"{row.mean_px:.3f}", reference)
     return table
 
 

@@ -1,6 +1,6 @@
 """Whether a calibration is good: what a person asks of a run's views and of stored calibrations, answered from disk.
 
-judge         who asks the store, and keeps what was made of it
+judge         who asks the store;  kept  what was made of it, for who asks again
 sightings     the target in a run's pictures, looked for once
 views         a run's views, each with how well it agrees
 """

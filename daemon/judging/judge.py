@@ -4,18 +4,28 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from calib import Calibration
 from calib.errors import ImageError
 from calib.picture_file import load_picture
 from daemon.errors import SessionUnreadableError, UnknownCalibrationError, UnknownViewError
 from daemon.jpeg import encoded
+from daemon.judging.kept import Kept
 from daemon.judging.sightings import Sightings
 from daemon.judging.views import JudgedView, views_by_calibration, views_by_themselves
 from daemon.procedure import RunManager
 from daemon.procedure.measured import session_of
 from daemon.procedure.worker import in_worker
-from daemon.store import Store
+from daemon.store import CalibrationRecord, Store
+
+if TYPE_CHECKING:
+    from calib.residual_map import ViewMisses
+
+CALIBRATIONS: Final = 8
+"""Calibrations that are kept in memory."""
+RESIDUALS: Final = 4
+"""And residuals of so many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +36,14 @@ class JudgedRun:
     views: Sequence[JudgedView]
 
 
+@dataclass(frozen=True, slots=True)
+class StoredOne:
+    """A calibration as it is stored, and read. Which one is active may have changed since."""
+
+    record: CalibrationRecord
+    calibration: Calibration
+
+
 class Judge:
     """Answers from disk, in worker threads; the loop has nothing to compute."""
 
@@ -33,6 +51,8 @@ class Judge:
         self._store = store
         self._runs = runs
         self._sightings = Sightings()
+        self._calibrations: Kept[str, StoredOne] = Kept(CALIBRATIONS)
+        self._residuals: Kept[str, Sequence[ViewMisses]] = Kept(RESIDUALS)
 
     async def views(self, run_id: str, calibration_id: str | None = None) -> JudgedRun:
         """Return a run's views as a calibration of it says of them, the run's latest unless another is named.
@@ -48,9 +68,13 @@ class Judge:
         if found is None:
             observed = await self._sightings.of(run_id, session)
             return JudgedRun(None, await in_worker(lambda: views_by_themselves(session, observed)))
-        calibration = await self._calibration(found, run_id)
+        stored = await self.calibration(found)
+        if stored.record.run_id != run_id:
+            raise UnknownCalibrationError(
+                f"calibration '{found}' is of run '{stored.record.run_id}', and not of '{run_id}'"
+            )
         events = await self._runs.told(run_id)
-        return JudgedRun(found, views_by_calibration(session, calibration, events))
+        return JudgedRun(found, views_by_calibration(session, stored.calibration, events))
 
     async def picture(self, run_id: str, number: int) -> Path:
         """Return where a view's picture is; raises UnknownRunError, UnknownViewError, SessionUnreadableError."""
@@ -69,10 +93,27 @@ class Judge:
         except ImageError as error:
             raise SessionUnreadableError(str(error)) from error
 
-    async def _calibration(self, calibration_id: str, run_id: str) -> Calibration:
-        record = await self._store.calibration(calibration_id)
-        if record.run_id != run_id:
-            raise UnknownCalibrationError(
-                f"calibration '{calibration_id}' is of run '{record.run_id}', and not of '{run_id}'"
-            )
-        return await asyncio.to_thread(record.read)
+    async def residuals(self, calibration_id: str) -> "Sequence[ViewMisses]":
+        """Return what every point of every view is off by; raises as `views` does, and CalibError."""
+        stored = await self.calibration(calibration_id)
+
+        async def work() -> "Sequence[ViewMisses]":
+            from calib.residual_map import residual_map  # it brings the solver, as `own_fit` does
+
+            run = await self._runs.get(stored.record.run_id or "")
+            session = await asyncio.to_thread(session_of, run, self._store.session_folder(run))
+            if session is None:
+                raise SessionUnreadableError(f"run '{run.id}' has no views on disk any more")
+            observed = await self._sightings.of(run.id, session)
+            return await in_worker(lambda: residual_map(stored.calibration, session, observed))
+
+        return await self._residuals.of(calibration_id, work)
+
+    async def calibration(self, calibration_id: str) -> "StoredOne":
+        """Return a calibration, read; raises UnknownCalibrationError, FormatError and StoreError."""
+
+        async def work() -> StoredOne:
+            record = await self._store.calibration(calibration_id)
+            return StoredOne(record, await asyncio.to_thread(record.read))
+
+        return await self._calibrations.of(calibration_id, work)

@@ -3,12 +3,16 @@
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
 from calib import Calibration
 from calib.documents import first_problem
 from calib.errors import FormatError
+
+if TYPE_CHECKING:
+    from calib.verification import Verification
 
 
 class RunState(StrEnum):
@@ -79,6 +83,19 @@ class CalibrationRecord(StoredCalibration):
         """Return the calibration; raises FormatError where its document is damaged."""
         try:
             return Calibration.model_validate_json(self.document)
+        except ValidationError as error:
+            raise FormatError(f"calibration '{self.id}' is damaged: {first_problem(error)}") from error
+
+    def read_verification(self) -> "Verification | None":
+        """Return what the held-out views said; raises FormatError where that is damaged."""
+        from calib.verification import (
+            VERIFICATION,
+        )  # it brings the solver, which listing calibrations does without
+
+        if self.verification is None:
+            return None
+        try:
+            return VERIFICATION.validate_json(self.verification)
         except ValidationError as error:
             raise FormatError(f"calibration '{self.id}' is damaged: {first_problem(error)}") from error
 

@@ -1,0 +1,65 @@
+"""Every point of every view, and by how much it misses: what a person looks for a pattern in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.calibration import Calibration
+from calib.detection import Prediction
+from calib.errors import CalibError
+from calib.observations import Observation, Observed
+from calib.prediction import predicted_by_calibration
+from calib.residuals import view_residuals
+from calib.second_look import second_look
+from calib.session import Session, View
+from calib.unfinished import finished_part
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ViewMisses:
+    """One view's points `ids` (n,), where they are seen `pixels` (n, 2), and `misses` (n, 2), predicted less seen."""
+
+    view: int
+    ids: NDArray[np.int64]
+    pixels: Array
+    misses: Array
+
+    @property
+    def rms_px(self) -> float:
+        """The misses' root mean square, over points."""
+        return float(np.sqrt((self.misses**2).sum(axis=1).mean()))
+
+
+def residual_map(calibration: Calibration, session: Session, observed: Observed) -> list[ViewMisses]:
+    """Return what each view of `session`, which `calibration` was solved from, is off by; `observed` is what it shows.
+
+    A target that was not found is looked for where the calibration has it. Views that carry poses have no points.
+    Raises CalibError where the session has gone on since then, and ImageError for a missing picture.
+    """
+    part = finished_part(session)
+    solved = [joint.name for joint in calibration.joints]
+    if solved != [joint.name for joint in part.session.joints]:
+        raise CalibError(
+            f"the calibration is of the joints {', '.join(solved) or 'none'}, and its run was taken up again since"
+        )
+    numbers = {place: number for number, place in enumerate(part.places)}
+    own = Observed(
+        [replace(o, view=numbers[o.view]) for o in observed.observations if o.view in numbers],
+        {numbers[place]: why for place, why in observed.unseen.items() if place in numbers},
+        {},
+    )
+
+    def predict(_: Sequence[Observation], view: View) -> Prediction:
+        camera = part.session.cameras[part.session.camera_index(view)].name
+        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
+
+    seen = second_look(part.session, own, predict).observations
+    return [
+        ViewMisses(part.places[residual.view], residual.ids, residual.places, residual.pixels)
+        for residual in view_residuals(calibration, part.session, seen)
+        if residual.pixels is not None
+    ]
