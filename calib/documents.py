@@ -19,7 +19,8 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 class Document(BaseModel):
     """A part of a file: unknown keys are kept, a known one must be right."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
+    # Parts are built with the whole that is read; most are never read alone.
+    model_config = ConfigDict(extra="allow", frozen=True, defer_build=True)
 
 
 def read_json(path: Path) -> Any:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection import Detection, detect_in_all
+from calib.detection import Detection
 from calib.errors import DetectionError, ImageError, UnsolvableError
 from calib.picture_file import load_picture
 from calib.session import Session, View
@@ -111,6 +111,8 @@ def _observation(session: Session, index: int, view: View) -> tuple[Observation,
         ids = np.array(view.points.ids, dtype=np.int64)
         pixels = np.array(view.points.pixels, dtype=float).reshape(-1, 2)
         return Observation(index, camera, ids, pixels, disk=view.points.disk == "centroid"), None
+    from calib.detection import detect_in_all  # loaded with the first picture: many have none to look at
+
     averaged = detect_in_all(pictures(session, view), session.target)
     return observed_in(averaged.detection, index, camera), averaged.warning
 

@@ -24,7 +24,7 @@ MOST_ROWS = 1000
 class _Print(BaseModel):
     """What every target has in common: it never changes, and keys it does not know are kept."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", strict=True)
+    model_config = ConfigDict(frozen=True, extra="allow", strict=True, defer_build=True)
 
 
 class _ScaledPrint(_Print):

@@ -3,10 +3,14 @@
 import asyncio
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING
 
-from calib.detection import Inspection, inspect
 from daemon.rig import Rig
 from drivers.camera import Frame
+
+if TYPE_CHECKING:
+    from calib.detection import Detection, Inspection
+    from calib.targets import Target
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +19,7 @@ class Sighting:
 
     frame: Frame
     taken_at: datetime
-    inspection: Inspection
+    inspection: "Inspection"
 
 
 class LiveDetection:
@@ -33,6 +37,12 @@ class LiveDetection:
             if self._newest is None or self._newest.frame is not frame:
                 before = None if self._newest is None else self._newest.inspection.detection
                 target = self._rig.profile.target
-                inspection = await asyncio.to_thread(inspect, frame.image, target, before=before)
+                inspection = await asyncio.to_thread(_inspect, frame, target, before)
                 self._newest = Sighting(frame, self._rig.utc.at(frame.timestamp), inspection)
             return self._newest
+
+
+def _inspect(frame: Frame, target: "Target", before: "Detection | None") -> "Inspection":
+    from calib.detection import inspect  # loaded here, beside the event loop, when somebody looks
+
+    return inspect(frame.image, target, before=before)

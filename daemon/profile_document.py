@@ -10,10 +10,14 @@ Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
 """The lowest and highest reading that an axis may be sent to."""
 
 
-class AxisDocument(BaseModel):
-    """An axis; limits, velocity, acceleration and tolerance are in its reading unit."""
+class _Part(BaseModel):
+    """A part of the profile, or all of it."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, defer_build=True)
+
+
+class AxisDocument(_Part):
+    """An axis; limits, velocity, acceleration and tolerance are in its reading unit."""
 
     name: str
     kind: Literal["revolute", "prismatic"]
@@ -29,10 +33,8 @@ class AxisDocument(BaseModel):
     driver: str
 
 
-class CameraDocument(BaseModel):
+class CameraDocument(_Part):
     """The camera; width and height in pixels."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     driver: str
@@ -43,10 +45,8 @@ class CameraDocument(BaseModel):
     intrinsics_std: dict[str, Any] | None
 
 
-class SweepDocument(BaseModel):
+class SweepDocument(_Part):
     """One joint exercised alone, from `start` through `readings` (reading units)."""
-
-    model_config = ConfigDict(frozen=True)
 
     joint: str
     start: dict[str, float]
@@ -54,19 +54,15 @@ class SweepDocument(BaseModel):
     use: Literal["fit", "verify"]
 
 
-class FreeViewDocument(BaseModel):
+class FreeViewDocument(_Part):
     """A picture outside the joint-by-joint plan."""
-
-    model_config = ConfigDict(frozen=True)
 
     readings: dict[str, float]
     use: Literal["fit", "verify"]
 
 
-class ProcedureDocument(BaseModel):
+class ProcedureDocument(_Part):
     """The pictures of a run."""
-
-    model_config = ConfigDict(frozen=True)
 
     settle_s: float
     max_reading_age_s: float
@@ -76,10 +72,8 @@ class ProcedureDocument(BaseModel):
     views: list[FreeViewDocument]
 
 
-class ProfileDocument(BaseModel):
+class ProfileDocument(_Part):
     """A rig: its axes in chain order, its camera, its target (metres) and its procedure."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     description: str

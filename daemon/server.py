@@ -107,9 +107,12 @@ def serve(
             host,
         )
     door = Door({host, *host_names}, keys=keys or not local, proxy=keys and local, tls=tls)
+    # What is loaded stays: the collector would look at it again and again while more is.
+    gc.disable()
     try:
         asyncio.run(_serve(profile, data, listening, door, on_ready))
     finally:
+        gc.enable()
         listening.close()
 
 
@@ -161,9 +164,9 @@ async def _serve(
             server = await opened.enter_async_context(serving(service, listening, door))
             for number in SIGNALS:
                 loop.add_signal_handler(number, server.handle_exit, number, None)
-            # What is loaded now stays: the collector would look at it again and again, and at the end for longer than
-            # all else takes.
+            # Not even now, or it would take longer at the end than all else does.
             gc.freeze()
+            gc.enable()
             if on_ready is not None:
                 on_ready(address_of(listening, door.tls))
             supervisor.tell(

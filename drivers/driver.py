@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class DriverOptions(BaseModel):
     """Base of a driver's option models: frozen, and an unknown key is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 @dataclass(frozen=True, slots=True)

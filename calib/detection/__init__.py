@@ -14,15 +14,20 @@ detector     one call for all kinds;  averaging  over several frames of one view
 tracking     measuring where the target is expected;  marks, lattice: what is to be seen there, and beyond
 health       how good a picture is to measure in;  edges: how wide they are;  health_in_words: what to do
 inspection   both at once
+
+Each is loaded when it is first used: who only says how good a picture was does not wait for the search.
 """
 
-from calib.detection.averaging import Averaged, detect_in_all, track_in_all
-from calib.detection.detection import Detection
-from calib.detection.detector import detect
-from calib.detection.health import PictureHealth, picture_health
-from calib.detection.health_in_words import Fault, faults
-from calib.detection.inspection import Inspection, inspect
-from calib.detection.tracking import Prediction, track
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from calib.detection.averaging import Averaged, detect_in_all, track_in_all
+    from calib.detection.detection import Detection
+    from calib.detection.detector import detect
+    from calib.detection.health import PictureHealth, picture_health
+    from calib.detection.health_in_words import Fault, faults
+    from calib.detection.inspection import Inspection, inspect
+    from calib.detection.tracking import Prediction, track
 
 __all__ = [
     "Averaged",
@@ -39,3 +44,22 @@ __all__ = [
     "track",
     "track_in_all",
 ]
+
+_MODULES = {
+    "averaging": ("Averaged", "detect_in_all", "track_in_all"),
+    "detection": ("Detection",),
+    "detector": ("detect",),
+    "health": ("PictureHealth", "picture_health"),
+    "health_in_words": ("Fault", "faults"),
+    "inspection": ("Inspection", "inspect"),
+    "tracking": ("Prediction", "track"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _MODULES.items():
+        if name in names:
+            from importlib import import_module
+
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module '{__name__}' has no attribute {name!r}")

@@ -1,14 +1,14 @@
 """The `activecam` command: errors become one sentence on stderr and an exit status of 1 or 2."""
 
+import gc
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module, metadata
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
 from calib.errors import CalibError, ReadingsError
-from daemon.cli.console import errors
 from daemon.errors import DaemonError
 from daemon.profile import ProfileError
 from drivers.errors import DriverError
@@ -67,8 +67,18 @@ def command_line(asked: str | None = None) -> typer.Typer:
     )
     app.callback()(_activecam)
     for module in [MODULES[asked]] if asked in MODULES else dict.fromkeys(MODULES.values()):
-        import_module(f"daemon.cli.{module}").register(app)
+        _load(module).register(app)
     return app
+
+
+def _load(module: str) -> Any:
+    # What is loaded stays: the collector would look at it again and again while more is.
+    gc.disable()
+    try:
+        return import_module(f"daemon.cli.{module}")
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -96,6 +106,8 @@ def _run(arguments: list[str]) -> int:
 
 
 def _fail(sentence: str, status: int) -> int:
+    from daemon.cli.console import errors  # rich takes its time to load, and what works needs none of it
+
     errors.print(f"activecam: {sentence}", markup=False, highlight=False, soft_wrap=True)
     return status
 

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from daemon.cli.console import output
 from daemon.operation.log_format import LogFormat, LogLevel, log_to_stderr
 from daemon.profile import load_profile
 from daemon.server import DEFAULT_HOST, DEFAULT_PORT
@@ -46,6 +45,6 @@ def serve(
     log_to_stderr(log_format, log_level)
 
     def ready(address: str) -> None:
-        output.print(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)", soft_wrap=True)
+        typer.echo(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)")
 
     serve_rig(rig, data, host, port, ready, host_names=host_name or (), keys=keys, tls=tls)

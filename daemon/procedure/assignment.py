@@ -3,17 +3,19 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from calib.session_writer import SessionWriter
 from daemon.procedure.conclusion import Conclusion, conclude
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import StateChanged
-from daemon.procedure.survey import Survey
 from daemon.profile.profile import NOWHERE_ELSE
 from daemon.rig import Rig
 from daemon.store import RunRecord, RunState
 from drivers.cancellation import finish
+
+if TYPE_CHECKING:
+    from daemon.procedure.survey import Survey
 
 Checkpoint = Callable[[], Awaitable[None]]
 End = tuple[RunState, str | None]
@@ -63,7 +65,8 @@ class Calibrate:
         # What the starter had in motion ended with the lease that was handed over, and may still be braking.
         await self._rig.stop_axes(list(self._rig.specs))
         if not writer.session.complete:
-            await Survey(self._rig, writer, log, checkpoint).take()
+            survey = await finish(asyncio.to_thread(_survey))
+            await survey(self._rig, writer, log, checkpoint).take()
         return await conclude(self._folder, log)
 
     async def halt(self) -> None:
@@ -78,6 +81,12 @@ class Calibrate:
         if (self._folder / "session.json").exists():
             return SessionWriter.resume(self._folder)
         return SessionWriter(self._folder, self._rig.profile.empty_session(self._starts))
+
+
+def _survey() -> "type[Survey]":
+    from daemon.procedure.survey import Survey  # and all that finds targets, beside the event loop
+
+    return Survey
 
 
 class Solve:

@@ -13,7 +13,7 @@ Use = Literal["fit", "verify"]
 class Event(BaseModel):
     """What all events carry. The log gives them their run and their number."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, defer_build=True)
 
     run_id: str = ""
     sequence: Annotated[int, Field(ge=0, description="Counts from 1 in each run.")] = 0
@@ -128,4 +128,4 @@ RunEvent = Annotated[
     | Finished,
     Field(discriminator="type"),
 ]
-EVENT: TypeAdapter[RunEvent] = TypeAdapter(RunEvent)
+EVENT: TypeAdapter[RunEvent] = TypeAdapter(RunEvent, config=ConfigDict(defer_build=True))

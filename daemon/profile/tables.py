@@ -48,7 +48,7 @@ Options = dict[str, Any]
 class Table(BaseModel):
     """A table of the file: an unknown key is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 class AxisTable(Table):
@@ -73,7 +73,7 @@ class AxisTable(Table):
 class ControllerTable(BaseModel):
     """A device that drives axes. Its further keys are its driver's, which checks them."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True, defer_build=True)
 
     driver: str
 

@@ -24,7 +24,7 @@ class Pattern(BaseModel, ABC):
     """A target as the profile's `[target]` describes it, lengths in metres."""
 
     # Keys that concern only who detects the target, such as how well its pitch is known, are not the world's.
-    model_config = ConfigDict(extra="ignore", frozen=True, strict=True)
+    model_config = ConfigDict(extra="ignore", frozen=True, strict=True, defer_build=True)
 
     rows: Count
     columns: Count

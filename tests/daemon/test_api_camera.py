@@ -10,7 +10,6 @@ import pytest
 
 from calib import detection
 from calib.detection import inspection
-from daemon import live_detection
 from daemon.api import create_app
 from daemon.service import Service, running_service
 from tests.daemon.rigs import LOOKING_AWAY, small_rig
@@ -47,14 +46,14 @@ async def test_many_who_ask_share_one_look(service: Service, monkeypatch: pytest
     async def same_frame() -> object:
         return frame
 
-    looks = []
+    looks, really = [], inspection.inspect
 
     def look(*given: object, **more: object) -> detection.Inspection:
         looks.append(given)
-        return detection.inspect(*given, **more)  # type: ignore[arg-type]
+        return really(*given, **more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(service.rig, "frame", same_frame)
-    monkeypatch.setattr(live_detection, "inspect", look)
+    monkeypatch.setattr(inspection, "inspect", look)
     sightings = await asyncio.gather(*(service.sightings.newest() for _ in range(5)))
     assert len(looks) == 1
     assert all(sighting is sightings[0] for sighting in sightings)

@@ -348,3 +348,31 @@ def test_a_signal_ends_a_run_and_the_daemon_in_order(tmp_path: Path, number: sig
     assert session["complete"] is False
     last = (data / "sessions" / run / "events.jsonl").read_text().splitlines()[-1]
     assert json.loads(last)["state"] == "interrupted"
+
+
+def test_a_start_loads_nothing_that_a_rig_at_rest_does_without(tmp_path: Path) -> None:
+    code = """
+import os, signal, sys
+from daemon.cli import main
+import typer
+
+def ready(address):
+    print(*sys.modules)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+typer.echo = ready
+main(["serve", "--profile", sys.argv[1], "--data", sys.argv[2], "--port", "0"])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(write_profile(tmp_path)), str(tmp_path / "data")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.split())
+    assert {"fastapi", "drivers.simulated.camera"} <= loaded
+    assert (
+        not {"scipy", "rich", "calib.solver", "calib.detection.detector", "drivers.grbl", "daemon.printing"}
+        & loaded
+    )
