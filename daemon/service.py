@@ -21,6 +21,7 @@ from daemon.live_picture import LivePicture
 from daemon.live_view import LiveView
 from daemon.operation.figures import Figures
 from daemon.operation.pulse import watch_loop
+from daemon.operation.readiness import StoreCheck
 from daemon.operation.rig_figures import RigFigures
 from daemon.pose import ActiveCalibration, Fallback, PoseService
 from daemon.procedure import RunManager
@@ -41,6 +42,7 @@ class Service:
         self.access = access
         self.rig = rig
         self.store = store
+        self.store_check = StoreCheck(store)
         self.figures = Figures()
         self.leases = LeaseDesk()
         self.motions = ClientMotions(rig, self.leases)

@@ -46,12 +46,33 @@ async def test_a_store_that_takes_nothing_is_in_the_way(
     client: httpx.AsyncClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(readiness, "PATIENCE", 0.05)
+    monkeypatch.setattr(readiness, "KEPT", 0.0)
     with closing(sqlite3.connect(tmp_path / "data" / "activecam.db")) as other:
         other.execute("BEGIN IMMEDIATE")
         status, [sentence] = await ready(client)
         assert (status, "has taken nothing for 0.05 s" in sentence) == (503, True)
-    monkeypatch.undo()
+    monkeypatch.setattr(readiness, "PATIENCE", 30.0)
     assert await ready(client) == (200, [])
+
+
+async def test_whoever_asks_how_often_the_store_is_written_to_once(
+    service: Service, client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = 0
+    write = service.store.check_writable
+
+    async def counted() -> None:
+        nonlocal written
+        written += 1
+        await write()
+
+    monkeypatch.setattr(service.store, "check_writable", counted)
+    assert await asyncio.gather(*(ready(client) for _ in range(20))) == [(200, [])] * 20
+    assert await ready(client) == (200, [])
+    assert written == 1
+    monkeypatch.setattr(readiness, "KEPT", 0.0)
+    assert await ready(client) == (200, [])
+    assert written == 2
 
 
 async def test_a_store_that_fails_is_in_the_way(service: Service, client: httpx.AsyncClient) -> None:
