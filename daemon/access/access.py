@@ -77,18 +77,21 @@ class Access:
 
 @contextlib.asynccontextmanager
 async def running_access(store: Store, *, keys_asked: bool) -> AsyncIterator[Access]:
-    """Read the keys, and keep them and the book up to date; on leaving, all is written.
+    """Keep the book, and the keys where they are asked for, up to date; on leaving, all is written.
 
     Raises NoKeyError where keys are asked for and there is none, and StoreError.
     """
     access = Access(store, keys_asked=keys_asked)
-    await access.ring.refresh()
-    if keys_asked and not len(access.ring):
-        raise NoKeyError(
-            "nobody could use this daemon: it asks for a key, and there is none; make one with 'activecam key add', "
-            "or listen on this machine alone"
-        )
-    tasks = [asyncio.create_task(access.ring.follow()), asyncio.create_task(access.book.keep())]
+    kept = [access.book.keep]
+    if keys_asked:
+        await access.ring.refresh()
+        if not len(access.ring):
+            raise NoKeyError(
+                "nobody could use this daemon: it asks for a key, and there is none; make one with "
+                "'activecam key add', or listen on this machine alone"
+            )
+        kept.append(access.ring.follow)
+    tasks = [asyncio.create_task(keep()) for keep in kept]
     try:
         yield access
     finally:

@@ -10,6 +10,7 @@ import httpx
 import pytest
 from websockets.asyncio.client import connect
 
+from daemon.access.access import running_access
 from daemon.access.key_ring import KeyRing
 from daemon.access.keys import ApiKey, digest_of, make_key
 from daemon.access.roles import Role
@@ -159,6 +160,31 @@ def test_a_daemon_that_nobody_could_use_is_not_started(
     with pytest.raises(NoKeyError):
         serve(profile, tmp_path / "data", port=0, keys=True)
     assert not caplog.text
+
+
+@pytest.mark.parametrize("asked", [False, True])
+async def test_keys_are_read_where_they_are_asked_for_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: bool
+) -> None:
+    monkeypatch.setattr("daemon.access.key_ring.REFRESHED", 0)
+    store = await Store.open(tmp_path)
+    await store.keys.add(make_key("anna", Role.OPERATOR)[1])
+    read, looks = store.keys.all, asyncio.Queue[None]()
+
+    async def counted() -> Sequence[ApiKey]:
+        looks.put_nowait(None)
+        return await read()
+
+    monkeypatch.setattr(store.keys, "all", counted)
+    async with running_access(store, keys_asked=asked) as access:
+        if asked:
+            for _ in range(3):
+                await looks.get()
+        else:
+            await access.book.read()  # whoever else uses the database's thread
+            await access.book.read()
+    assert asked or looks.empty()
+    await store.close()
 
 
 async def test_while_the_store_cannot_be_read_the_keys_stay_as_they_were(
