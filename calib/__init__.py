@@ -22,6 +22,7 @@ data flows through them:
     links, dh, document          D-H and base read off the screws, and all written down: calibration
     pose_covariance, projection, dh_covariance   how sure a pose is, where a point is seen, and a D-H parameter
     residuals, quality, verdict, verification  is it good?  own_fit, residual_map  what to look at where it is not
+    scene, comparison            the rig in 3-D; two calibrations of it side by side
     paper, paper_tables, stated_parameters     the paper's tables, ours beside them, and all parameters in a row
     solver                       from a session to a calibration
 """

@@ -37,7 +37,7 @@ from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
 from daemon.service import Service
 
-API_VERSION: Final = "1.4.0"
+API_VERSION: Final = "1.5.0"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """

@@ -57,6 +57,8 @@ ROLES: Final[dict[str, Role | None]] = {
     "GET /calibrations/{calibration_id}/exports/{name}": VIEWER,
     "GET /calibrations/{calibration_id}/residuals": VIEWER,
     "GET /calibrations/{calibration_id}/tables": VIEWER,
+    "GET /calibrations/{calibration_id}/scene": VIEWER,
+    "GET /calibrations/{calibration_id}/compare/{other_id}": VIEWER,
     "POST /calibrations/{calibration_id}/activate": OPERATOR,
     "GET /session": VIEWER,
     "POST /session": VIEWER,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 from calib import Calibration
 from calib.errors import ImageError
 from calib.picture_file import load_picture
+from calib.scene import Scene, scene
 from daemon.errors import SessionUnreadableError, UnknownCalibrationError, UnknownViewError
 from daemon.jpeg import encoded
 from daemon.judging.kept import Kept
@@ -20,10 +21,13 @@ from daemon.procedure.worker import in_worker
 from daemon.store import CalibrationRecord, Store
 
 if TYPE_CHECKING:
+    from calib.comparison import Comparison
     from calib.residual_map import ViewMisses
 
 CALIBRATIONS: Final = 8
 """Calibrations that are kept in memory."""
+SCENES: Final = 64
+"""Scenes, each at its readings."""
 RESIDUALS: Final = 4
 """And residuals of so many."""
 
@@ -52,6 +56,7 @@ class Judge:
         self._runs = runs
         self._sightings = Sightings()
         self._calibrations: Kept[str, StoredOne] = Kept(CALIBRATIONS)
+        self._scenes: Kept[tuple[str, tuple[float, ...], tuple[int, ...] | None], Scene] = Kept(SCENES)
         self._residuals: Kept[str, Sequence[ViewMisses]] = Kept(RESIDUALS)
 
     async def views(self, run_id: str, calibration_id: str | None = None) -> JudgedRun:
@@ -108,6 +113,25 @@ class Judge:
             return await in_worker(lambda: residual_map(stored.calibration, session, observed))
 
         return await self._residuals.of(calibration_id, work)
+
+    async def scene(
+        self, calibration_id: str, readings: Sequence[float], approached: Sequence[int] | None = None
+    ) -> Scene:
+        """Return the rig in 3-D at `readings`; raises as `calibration` does, and ReadingsError."""
+        stored = await self.calibration(calibration_id)
+
+        async def work() -> Scene:
+            return await asyncio.to_thread(scene, stored.calibration, readings, approached)
+
+        sides = None if approached is None else tuple(approached)
+        return await self._scenes.of((calibration_id, tuple(readings), sides), work)
+
+    async def comparison(self, calibration_id: str, other_id: str) -> "Comparison":
+        """Return what the second has otherwise than the first; raises as `calibration` does, and CalibError."""
+        from calib.comparison import compare
+
+        first, second = await self.calibration(calibration_id), await self.calibration(other_id)
+        return await in_worker(lambda: compare(first.calibration, second.calibration))
 
     async def calibration(self, calibration_id: str) -> "StoredOne":
         """Return a calibration, read; raises UnknownCalibrationError, FormatError and StoreError."""

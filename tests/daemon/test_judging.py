@@ -149,3 +149,50 @@ async def test_what_is_not_stored_is_not_judged(client: httpx.AsyncClient) -> No
     for what in ("residuals", "tables"):
         answer = await client.get(f"/calibrations/none/{what}")
         assert (answer.status_code, answer.json()["code"]) == (404, "unknown_calibration")
+
+
+async def test_the_scene_is_of_now_or_of_given_readings(
+    client: httpx.AsyncClient, service: Service, run: RunRecord
+) -> None:
+    path = f"/calibrations/{run.calibration_id}/scene"
+    await service.rig.move({"slide": 30.0, "pan": 4.0})
+    now, given = await asked(client, path), await asked(client, path, readings=[30.0, 4.0])
+    assert now["readings"] == pytest.approx([30.0, 4.0], abs=0.05)
+    pose = await asked(client, "/pose")
+    np.testing.assert_allclose(now["cameras"][0]["pose"], pose["world_from_camera"], atol=1e-4)
+    np.testing.assert_allclose(given["cameras"][0]["pose"], now["cameras"][0]["pose"], atol=2e-3)
+    assert [joint["name"] for joint in given["joints"]] == ["slide", "pan"]
+    assert len(given["target"]["points"]) == 20
+    assert given["cameras"][0]["uncertainty"] is not None
+    for readings, code in ([[1.0]], "readings_invalid"), ([["nan", 0]], "invalid_request"):
+        refused = await client.get(path, params={"readings": readings[0]})
+        assert (refused.status_code, refused.json()["code"]) == (422, code)
+
+
+async def test_a_scene_at_the_same_readings_is_worked_out_once(
+    client: httpx.AsyncClient, run: RunRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = f"/calibrations/{run.calibration_id}/scene"
+    first = await asked(client, path, readings=[30.0, 4.0])
+    monkeypatch.setattr("daemon.judging.judge.scene", lambda *_: pytest.fail("again"))
+    assert await asked(client, path, readings=[30.0, 4.0]) == first
+
+
+async def test_two_calibrations_are_compared(
+    client: httpx.AsyncClient, service: Service, run: RunRecord
+) -> None:
+    again, _ = await finish(service, await service.runs.solve(run.id, [1]))
+    found = await asked(client, f"/calibrations/{run.calibration_id}/compare/{again.calibration_id}")
+    assert (found["first"], found["second"]) == (run.calibration_id, again.calibration_id)
+    assert (found["agree"], found["sentence"].partition(":")[0]) == (True, "They agree")
+    assert found["poses"]["position_max_m"] > 0
+    early = await service.runs.start()
+    async for event in service.runs.events(early.id):
+        if event.type == "view" and event.view == 3:
+            await service.runs.cancel(early.id)
+    slide_alone, _ = await finish(service, await service.runs.solve(early.id))
+    refused = await client.get(f"/calibrations/{run.calibration_id}/compare/{slide_alone.calibration_id}")
+    assert (refused.status_code, refused.json()["code"]) == (409, "calibration_unusable")
+    mismatched = await client.get(f"/calibrations/{slide_alone.calibration_id}/scene")
+    assert (mismatched.status_code, mismatched.json()["code"]) == (409, "calibration_mismatch")
+    assert (await client.get(f"/calibrations/none/compare/{run.calibration_id}")).status_code == 404
