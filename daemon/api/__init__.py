@@ -5,7 +5,8 @@ Its parts:
     app             all routes together
     guard           what no route gets to see;  observed  each request's id, log record and time
     gate            who is let in, by rules;  witness  what is written down of it;  security  what is described of it
-    problems        errors as problem documents;  dependencies, bodies  what routes are given
+    problems        errors as problem documents;  wrong_requests  where a request may be one
+    dependencies, bodies  what routes are given
     once            requests that are carried out once, however often they are sent
     rig, health, lease, axes, camera, runs, calibrations, exports, poses, metrics, session, audit
                     routes by what they are about;  *_documents  their larger answers

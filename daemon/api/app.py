@@ -35,9 +35,10 @@ from daemon.api.live_state import LiveState
 from daemon.api.observed import Observed
 from daemon.api.rules import PREFIX, ROLES, ROLES_AT_ROOT, Rules
 from daemon.api.security import describe_roles
+from daemon.api.wrong_requests import forget_wrong_requests
 from daemon.service import Service
 
-API_VERSION: Final = "1.5.0"
+API_VERSION: Final = "1.5.1"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
@@ -137,6 +138,7 @@ def _describe_problems(app: FastAPI) -> None:
                 schema.pop("$defs", None)
                 schemas[model.__name__] = schema
             describe_roles(document)
+            forget_wrong_requests(document)
         assert app.openapi_schema is not None
         return app.openapi_schema
 

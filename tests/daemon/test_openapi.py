@@ -39,3 +39,11 @@ def test_every_operation_is_described(rig: Served) -> None:
     move = document["paths"]["/api/v1/axes/{name}/move"]["post"]["responses"]
     assert set(move) == {"200", "202", "401", "403", "404", "409", "422", "503"}
     assert "`not_homed`" in move["409"]["description"]
+
+
+def test_a_wrong_request_is_an_answer_where_there_is_something_to_check(rig: Served) -> None:
+    paths = httpx.get(f"{rig.address}/api/v1/openapi.json").json()["paths"]
+    for method, path in (("post", "stop"), ("get", "runs/{run_id}"), ("get", "calibrations/current")):
+        assert "422" not in paths[f"/api/v1/{path}"][method]["responses"], path
+    for method, path in (("post", "pose"), ("get", "camera/stream.mjpg"), ("delete", "lease")):
+        assert "invalid_request" in paths[f"/api/v1/{path}"][method]["responses"]["422"]["description"], path
