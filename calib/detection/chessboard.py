@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ from calib.detection.corners import measure_corners
 from calib.detection.detection import Detection
 from calib.detection.labelling import is_mirrored, upright
 from calib.detection.picture import Picture, copies, in_original
-from calib.detection.plane import view_of_plane
+from calib.detection.plane import span_a_plane, view_of_plane
 from calib.errors import DetectionError
 from calib.targets import Chessboard, target_points
 
@@ -22,6 +22,8 @@ LEAST_CONTRAST = 0.15  # beside a corner, of that in the middle; disks have it i
 LEAST_CHEQUERED = 0.9  # of the corners
 COPYS_ERROR = 1.5  # px of the copy
 STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.1)
+
+Search = Callable[[NDArray[np.uint8], tuple[int, int]], tuple[bool, cv2.typing.MatLike]]
 
 
 def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
@@ -47,25 +49,36 @@ def detect_chessboard(picture: Picture, target: Chessboard) -> Detection:
     reading = upright(target, corners.pixels)
     ids = np.flatnonzero(corners.found[reading])
     there = reading[ids]
-    if view_of_plane(points[ids], corners.pixels[there]) is None:
+    if not span_a_plane(points[ids]):
         raise not_found
     return Detection(ids, corners.pixels[there], corners.covariances[there], disk=None)
 
 
 def _found(grey: NDArray[np.uint8], target: Chessboard) -> Iterator[NDArray[np.float64]]:
-    """Search ever harder for corners (rows, columns, 2), in any of the orders that OpenCV may choose.
-
-    A board that fills enough of the picture is found in a smaller copy, in a tenth of the time. The whole of a larger
-    picture is searched in the one way that does not take ever longer the more there is to be seen in it.
-    """
+    """Search ever harder for corners (rows, columns, 2), in any of the orders that OpenCV may choose."""
     pattern = (target.columns, target.rows)
+    for searched, scale, search in _searches(grey):
+        found, corners = search(searched, pattern)
+        if found:
+            near = in_original(np.asarray(corners, dtype=np.float64), scale)
+            yield _brought_near(grey, near, scale).reshape(*pattern[::-1], 2)
+
+
+def _searches(grey: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], float, Search]]:
+    """Give copies to search, each with its scale, and how.
+
+    A board that fills enough of the picture is found in a copy of half its size or less, which has less noise, in a
+    small part of the time. The whole of a larger picture is searched in the one way that does not take ever longer the
+    more there is to be seen in it.
+    """
+    yield *next(copies(grey, min(max(grey.shape) // 2, SEARCHED_SIDE))), _quickly
     for searched, scale in copies(grey, SEARCHED_SIDE):
-        searches = SEARCHES if max(searched.shape) <= SEARCHED_SIDE else (_by_sectors,)
-        for search in searches:
-            found, corners = search(searched, pattern)
-            if found:
-                near = in_original(np.asarray(corners, dtype=np.float64), scale)
-                yield _brought_near(grey, near, scale).reshape(*pattern[::-1], 2)
+        for search in THOROUGHER if max(searched.shape) <= SEARCHED_SIDE else (_by_sectors,):
+            yield searched, scale, search
+
+
+def _quickly(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
+    return cv2.findChessboardCorners(grey, pattern, flags=0)
 
 
 def _by_quadrangles(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
@@ -81,7 +94,7 @@ def _thoroughly(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool
     return cv2.findChessboardCornersSB(grey, pattern, flags=flags)
 
 
-SEARCHES = (_by_quadrangles, _by_sectors, _thoroughly)
+THOROUGHER = (_by_quadrangles, _by_sectors, _thoroughly)
 
 
 def _brought_near(grey: NDArray[np.uint8], pixels: NDArray[np.float64], scale: float) -> NDArray[np.float64]:

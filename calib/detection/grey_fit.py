@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.picture import Picture
+from calib.detection.smooth import smooth
 from calib.detection.strips import Floats, Patches, Singles
 
 Shape = Callable[[Floats], tuple[Singles, Singles]]
@@ -17,6 +18,8 @@ MOST_STEPS = 12
 STANDS_STILL = 0.05  # of a shape, in px, radians, or relative; each step leaves a tenth of the one before
 LONGEST_STEP = 0.5  # the same, but at once
 ROUNDING_VARIANCE = 1 / 12
+LIGHTS_DEGREE = 3
+LEAST_SLOPE = 1e-6  # of the light a px
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,14 @@ class Light:
     def unknown(cls, pieces: int) -> Light:
         """Of any slope that is seen on targets."""
         return cls(np.zeros((pieces, 2)), 0.005)
+
+    @classmethod
+    def followed(cls, pixels: Floats, levels: Floats, good: NDArray[np.bool_], apart: float) -> Light:
+        """Follow it by the logarithms (n,) of levels from good piece to good piece, which are so far `apart` (px)."""
+        light = smooth(pixels[good], levels[good, None], LIGHTS_DEGREE)
+        slopes = [(light.at(pixels + step) - light.at(pixels - step)) / 2 for step in np.eye(2)]
+        off = float(np.sqrt(np.square(levels[good, None] - light.at(pixels[good])).mean()))
+        return cls(np.concatenate(slopes, axis=1), max(off / apart, LEAST_SLOPE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,23 +87,29 @@ def fit_grey_values(
     prior = np.zeros(k + 4)
     prior[k + 2 :] = (picture.noise / light.std) ** 2
     rows = np.empty((n, k + 5, used.shape[1]), dtype=np.float32)
-    jacobian, residuals = rows[:, :-1], rows[:, -1]
+    by_shape, by_mean, by_step, by_light, residuals = np.split(rows, [k, k + 1, k + 2, k + 4], axis=1)
     for _ in range(MOST_STEPS):
         mean, step, along_x, along_y = fitted[:, k:].T[..., None].astype(np.float32)
-        lit = 1 + along_x * x + along_y * y
-        reflected = mean + step * drawn
+        lit, reflected = along_x * x, step * drawn
+        lit += along_y * y
+        lit += 1
+        reflected += mean
         model = lit * reflected
-        counted = used * ((model > lowest) & (model < highest))
-        np.multiply(slopes, (step * lit * counted)[:, None], out=jacobian[:, :k])
-        np.multiply(lit, counted, out=jacobian[:, k])
-        np.multiply(drawn, jacobian[:, k], out=jacobian[:, k + 1])
+        seen = np.clip(model, lowest, highest)
+        counted = np.equal(seen, model, out=model)
+        counted *= used
+        lit *= counted
         reflected *= counted
-        np.multiply(x, reflected, out=jacobian[:, k + 2])
-        np.multiply(y, reflected, out=jacobian[:, k + 3])
-        np.subtract(patches.values, np.clip(model, lowest, highest, out=model), out=residuals)
-        residuals *= used
+        by_mean[:, 0] = lit
+        np.multiply(drawn, lit, out=by_step[:, 0])
+        lit *= step
+        np.multiply(slopes, lit[:, None], out=by_shape)
+        np.multiply(x, reflected, out=by_light[:, 0])
+        np.multiply(y, reflected, out=by_light[:, 1])
+        np.subtract(patches.values, seen, out=residuals[:, 0])
+        residuals[:, 0] *= used
         # numpy takes several times as long for a product of the jacobian with itself.
-        equations = (jacobian @ rows.swapaxes(1, 2)).astype(np.float64)
+        equations = (rows[:, :-1] @ rows.swapaxes(1, 2)).astype(np.float64)
         normal = equations[..., :-1] + np.diag(prior)
         # A piece without contrast has no shape to speak of; it must not keep the others from theirs.
         normal += (1e-6 * np.diagonal(normal, axis1=1, axis2=2)[:, None] + 1e-9) * np.eye(k + 4)
@@ -106,7 +123,8 @@ def fit_grey_values(
             break
         drawn, slopes = shape(fitted[:, :k])
     freedom = np.maximum(used.sum(axis=1) - (k + 4), 1)
-    variance = np.maximum(np.square(residuals).sum(axis=1) / freedom, ROUNDING_VARIANCE)
+    squares = (residuals @ residuals.swapaxes(1, 2))[:, 0, 0]
+    variance = np.maximum(squares / freedom, ROUNDING_VARIANCE)
     covariances = variance[:, None, None] * np.linalg.inv(normal)[:, :k, :k]
     converged = (moved < 5 * STANDS_STILL) & np.isfinite(fitted).all(axis=1)
     return GreyFit(fitted[:, :k], covariances, fitted[:, k], fitted[:, k + 1], np.sqrt(variance), converged)

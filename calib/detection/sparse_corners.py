@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.corners import UNMODELLED_VARIANCE, Crossings, light_at, saddle
-from calib.detection.edge_profile import FIRST_BLUR, LEAST_BLUR
-from calib.detection.grey_fit import fit_grey_values
+from calib.detection.crossings import UNMODELLED_VARIANCE, Crossings, fit_crossings
+from calib.detection.edge_profile import FIRST_BLUR
+from calib.detection.grey_fit import Light
 from calib.detection.picture import Picture
 from calib.detection.strips import Floats, Patches
 
@@ -35,23 +35,15 @@ class SparseCorners(NamedTuple):
     good: NDArray[np.bool_]
 
 
-def sparse_corners(
-    values: NDArray[np.uint8 | np.uint16], noise: float, crossings: Crossings, paper: Floats
-) -> SparseCorners:
-    """Measure corners in grey values (h, w) that have such a noise, and are `paper` (n,) in white squares."""
-    patches = _patches(values, crossings)
-    n = len(paper)
-    start = np.column_stack([np.zeros((n, 2)), np.full(n, np.log(FIRST_BLUR))])
-    least = np.array([-np.inf, -np.inf, np.log(LEAST_BLUR)])
+def sparse_corners(picture: Picture, crossings: Crossings, paper: Floats) -> SparseCorners:
+    """Measure corners that are known to a pixel or so, and are `paper` (n,) in white squares."""
+    n, patches = len(paper), _patches(picture, crossings)
+    apart = float(np.median(crossings.lengths))
+    light = Light.followed(crossings.pixels, np.log(np.maximum(paper, 1)), np.ones(n, dtype=bool), apart)
     heights = crossings.heights(patches.x, patches.y)
-    shape = partial(saddle, crossings.directions.astype(np.float32), heights)
-    everywhere = np.ones(n, dtype=bool)
-    light = light_at(
-        crossings.pixels, np.log(np.maximum(paper, 1)), everywhere, float(np.median(crossings.lengths))
-    )
-    # Nothing of the picture is looked at but the patches.
-    seen = Picture(np.empty((0, 0), np.uint8), patches.values, noise)
-    fit = fit_grey_values(seen, patches, shape, start, least, light, STANDS_STILL)
+    # Of the picture's extremes, those of the patches tell as much.
+    seen = replace(picture, values=patches.values)
+    fit = fit_crossings(seen, crossings, patches, heights, np.full(n, FIRST_BLUR), light, STANDS_STILL)
     return SparseCorners(
         crossings.pixels + fit.parameters[:, :2],
         fit.covariances[:, :2, :2] + UNMODELLED_VARIANCE * np.eye(2),
@@ -61,9 +53,9 @@ def sparse_corners(
     )
 
 
-def _patches(values: NDArray[np.uint8 | np.uint16], crossings: Crossings) -> Patches:
+def _patches(picture: Picture, crossings: Crossings) -> Patches:
     """Take the pixels nearest to places along both edges of each corner, and across."""
-    n, (height, width) = len(crossings.pixels), values.shape
+    n, (height, width) = len(crossings.pixels), picture.values.shape
     along = crossings.lengths[:, :, None, None] * ALONG[:, None]
     unit_x, unit_y = (crossings.directions[:, :, axis, None, None] for axis in (0, 1))
     x, y = crossings.pixels[:, 0, None, None, None], crossings.pixels[:, 1, None, None, None]
@@ -71,5 +63,5 @@ def _patches(values: NDArray[np.uint8 | np.uint16], crossings: Crossings) -> Pat
     row = np.rint(y + along * unit_y + ACROSS * unit_x).astype(np.int32)
     used = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     used &= np.abs(ACROSS) < np.maximum(crossings.clear - CLEAR_OF_BLUR, APART + 0.1)[:, None, None, None]
-    taken = np.take(values, row * width + column, mode="clip")
+    taken = np.take(picture.values, row * width + column, mode="clip")
     return Patches(*(part.astype(np.float32).reshape(n, -1) for part in (column - x, row - y, taken, used)))

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.corners import crossings_of
+from calib.detection.crossings import crossings_of
 from calib.detection.detection import Detection
 from calib.detection.lattice import Lattice
 from calib.detection.looks import Looks, look_at
@@ -190,7 +190,8 @@ def _corners(
 ) -> _Measured:
     points, near = marks.middles[chosen], places.points[chosen, 0]
     crossings = crossings_of(places.view, points, near, marks.spacing, marks.clear)
-    found = sparse_corners(window.values, window.noise, crossings, np.maximum(looks.paper, looks.ink)[chosen])
+    picture = Picture(np.empty((0, 0), np.uint8), window.values, window.noise)
+    found = sparse_corners(picture, crossings, np.maximum(looks.paper, looks.ink)[chosen])
     good = found.good & (
         found.left < np.maximum(LEFT_OF_NOISE * window.noise, 2 * LEFT * np.abs(found.steps))
     )
