@@ -56,10 +56,11 @@ def strips(picture: Picture, origins: Floats, starts: Floats, ends: Floats, widt
     ahead, aside = np.where(steep, row, 1)[:, None], np.where(steep, 1, row)[:, None]
     nearest = (along * ahead + lowest * aside).astype(np.intp)
     values = np.take(picture.values, nearest[..., None] + across * aside[..., None], mode="clip")
-    off_along = np.broadcast_to((along - origin[:, :1]).astype(np.float32)[..., None], used.shape)
-    off_across = (lowest - origin[:, 1:]).astype(np.float32)[..., None] + across.astype(np.float32)
+    off_along, off_across = (along - origin[:, :1]), (lowest - origin[:, 1:])
     x, y = (
-        np.where(steep[:, None, None], *pair) for pair in ((off_across, off_along), (off_along, off_across))
+        np.where(which[:, None], off_across, off_along).astype(np.float32)[..., None]
+        + (which[:, None] * across).astype(np.float32)[:, None]
+        for which in (steep, ~steep)
     )
     return Patches(
         *(each.astype(np.float32, copy=False).reshape(len(starts), -1) for each in (x, y, values, used))
