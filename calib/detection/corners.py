@@ -47,7 +47,7 @@ class Corners:
 def measure_corners(
     picture: Picture, view: PlaneView, points: Floats, pixels: Floats, pitch: float, clear: float
 ) -> Corners:
-    """Measure the corners at points (n, 2) of a print, in m, which are within 2 px or so of pixels (n, 2).
+    """Measure the corners at points (n, 2) of a print, in m, most of them within 2 px or so of pixels (n, 2).
 
     Edges run through them along x and y, with the next ones `pitch` (m) away and nothing else `clear` (m) to both
     sides.

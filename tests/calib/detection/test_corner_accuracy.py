@@ -153,6 +153,18 @@ def test_corners_are_measured_from_where_they_are_predicted_and_none_where_there
     assert np.sqrt(np.square(corners.pixels - drawn.points)[corners.found].mean()) < 0.02
 
 
+def test_a_corner_that_a_search_put_far_off_is_measured_where_the_others_say():
+    drawn = draw(CHESSBOARD, tilt=(24, 18), roll=7, blur=0.8, noise=2)
+    found = drawn.points.copy()
+    found[30] += [8, -9]
+
+    points = target_points(CHESSBOARD)[:, :2]
+    view, pitch = PlaneView(drawn.picture_from_world), CHESSBOARD.pitch
+    corners = measure_corners(read_picture(drawn.picture), view, points, found, pitch, pitch / 2)
+    assert corners.found.all()
+    np.testing.assert_allclose(corners.pixels, drawn.points, atol=0.03)
+
+
 def test_a_bent_view_follows_a_lens_by_few_points_and_between_them():
     view = PlaneView(np.array([[1000.0, 20, 300], [-30, 900, 200], [0.1, 0.2, 1]]))
     points = np.stack(np.meshgrid(np.linspace(0, 0.6, 4), np.linspace(0, 0.6, 3)), axis=-1).reshape(-1, 2)
