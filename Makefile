@@ -8,8 +8,9 @@ PROFILE ?= paper-table
 DATA ?= activecam-data
 FUZZ_EXAMPLES ?= 300
 SOAK_MINUTES ?= 60
+SCREENSHOTS ?= screenshots
 
-.PHONY: demo test test-kernel test-kill test-fuzz soak lint format serve bench bench-peers figures clean
+.PHONY: demo test test-kernel test-kill test-fuzz soak lint format serve bench bench-peers screenshots figures clean
 
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
@@ -46,6 +47,9 @@ serve: $(VENV)/.installed ## The daemon on PROFILE, with its data in DATA
 
 bench: $(VENV)/.installed-dev ## What we claim about accuracy and speed, measured
 	$(BIN)/python -m benchmarks
+
+screenshots: $(VENV)/.installed-dev ## The page in each of its states, as PNG in SCREENSHOTS
+	$(BIN)/python -m tests.browser.screenshots $(SCREENSHOTS)
 
 bench-peers: $(VENV)/.installed-dev $(PEERS)/.installed ## The calibration beside other packages, which need an environment of their own
 	$(BIN)/python -m benchmarks peers

@@ -8,7 +8,7 @@ Its parts:
     problems        errors as problem documents;  wrong_requests  where a request may be one
     dependencies, bodies  what routes are given
     once            requests that are carried out once, however often they are sent
-    rig, health, lease, axes, camera, runs, calibrations, exports, poses, metrics, session, audit
+    rig, health, lease, axes, camera, runs, coverage, calibrations, exports, poses, metrics, session, audit
                     routes by what they are about;  *_documents  their larger answers
     live, live_state, relay
                     the page's socket, what it tells, and how a command over it is a request as any other

@@ -12,6 +12,7 @@ from daemon.api import (
     calibrations,
     camera,
     camera_live,
+    coverage,
     exports,
     health,
     judging,
@@ -38,7 +39,7 @@ from daemon.api.security import describe_roles
 from daemon.api.wrong_requests import forget_wrong_requests
 from daemon.service import Service
 
-API_VERSION: Final = "1.5.1"
+API_VERSION: Final = "1.6.0"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """
@@ -103,6 +104,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
         runs,
         views,
         judging,
+        coverage,
         calibrations,
         exports,
         session,

@@ -44,6 +44,7 @@ ROLES: Final[dict[str, Role | None]] = {
     "GET /runs/checklist": VIEWER,
     "GET /runs/{run_id}": VIEWER,
     "GET /runs/{run_id}/events": VIEWER,
+    "GET /runs/{run_id}/coverage": VIEWER,
     "GET /runs/{run_id}/views": VIEWER,
     "GET /runs/{run_id}/views/{number}/image.jpg": VIEWER,
     "POST /runs/{run_id}/pause": OPERATOR,

@@ -2,14 +2,17 @@
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from calib import Calibration
 from calib.errors import ImageError
+from calib.observations import Observation
 from calib.picture_file import load_picture
 from calib.scene import Scene, scene
+from calib.stated_quality import CameraCoverage
+from calib.targets import Target
 from daemon.errors import SessionUnreadableError, UnknownCalibrationError, UnknownViewError
 from daemon.jpeg import encoded
 from daemon.judging.kept import Kept
@@ -18,7 +21,9 @@ from daemon.judging.views import JudgedView, views_by_calibration, views_by_them
 from daemon.procedure import RunManager
 from daemon.procedure.measured import session_of
 from daemon.procedure.worker import in_worker
+from daemon.profile import Profile
 from daemon.store import CalibrationRecord, Store
+from drivers.camera import CameraSpec
 
 if TYPE_CHECKING:
     from calib.comparison import Comparison
@@ -81,6 +86,17 @@ class Judge:
         events = await self._runs.told(run_id)
         return JudgedRun(found, views_by_calibration(session, stored.calibration, events))
 
+    async def coverage(self, run_id: str, profile: Profile) -> CameraCoverage:
+        """Return how a run's views cover the picture of the camera of `profile`, which took them.
+
+        Raises UnknownRunError, SessionUnreadableError and StoreError.
+        """
+        run = await self._runs.get(run_id)
+        session = await asyncio.to_thread(session_of, run, self._store.session_folder(run))
+        seen = [] if session is None else (await self._sightings.of(run_id, session)).observations
+        target = profile.target if session is None else session.target
+        return await in_worker(lambda: _coverage(profile.camera.spec, target, seen))
+
     async def picture(self, run_id: str, number: int) -> Path:
         """Return where a view's picture is; raises UnknownRunError, UnknownViewError, SessionUnreadableError."""
         run = await self._runs.get(run_id)
@@ -141,3 +157,10 @@ class Judge:
             return StoredOne(record, await asyncio.to_thread(record.read))
 
         return await self._calibrations.of(calibration_id, work)
+
+
+def _coverage(camera: CameraSpec, target: Target, seen: Sequence[Observation]) -> CameraCoverage:
+    from calib.coverage import coverage, missing_in_words  # it brings detection, which poses do without
+
+    covered = coverage(target, (camera.width, camera.height), seen)
+    return CameraCoverage(camera=camera.name, missing=missing_in_words(covered), **asdict(covered))

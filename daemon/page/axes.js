@@ -2,6 +2,7 @@
 
 import { fill, h, setText } from "./elements.js";
 import { Jogging } from "./jogging.js";
+import { Scales } from "./scales.js";
 import { measureOf, number, quantity, reading, sign } from "./units.js";
 
 /** Jog steps in mm or degrees, or in whatever an axis counts, as shares of a power of ten. */
@@ -17,6 +18,7 @@ export function mountAxes(element, page, signal) {
   page.guard(fieldset, signal);
 
   const jogging = new Jogging(page, signal);
+  const scales = new Scales(page, signal);
   const shown = new Map();
   let chosen = 0;
 
@@ -24,7 +26,7 @@ export function mountAxes(element, page, signal) {
     const axes = state?.rig.axes ?? [];
     if (axes.some((axis) => !shown.has(axis.name))) {
       shown.clear();
-      for (const axis of axes) shown.set(axis.name, new Card(axis, page, jogging, signal));
+      for (const axis of axes) shown.set(axis.name, new Card(axis, page, jogging, scales, signal));
       fill(cards, ...[...shown.values()].map((card) => card.element));
       choose(0);
     }
@@ -56,13 +58,16 @@ class Card {
   #page;
   #axis;
   #measure;
+  #scales;
   #position = h("output", { class: "position" }, "–");
+  #scaled = h("span", { class: "scaled" });
   #condition = h("span", { class: "condition" });
   #marker = h("i", {});
   #error = h("p", { class: "problem", role: "status" });
 
-  constructor(axis, page, jogging, signal) {
+  constructor(axis, page, jogging, scales, signal) {
     this.#page = page;
+    this.#scales = scales;
     this.#axis = axis;
     this.#measure = measureOf(axis);
     const { name } = axis;
@@ -76,7 +81,7 @@ class Card {
     this.element = h(
       "article",
       { class: "axis", "aria-label": `Axis ${name}` },
-      h("div", { class: "axis-head" }, h("h3", {}, name), this.#condition, this.#position),
+      h("div", { class: "axis-head" }, h("h3", {}, name), this.#condition, this.#scaled, this.#position),
       this.#bar(),
       h(
         "div",
@@ -94,11 +99,13 @@ class Card {
     if (axis === null) {
       setText(this.#position, "–");
       setText(this.#condition, "not known");
+      setText(this.#scaled, "");
       this.#marker.hidden = true;
       return;
     }
     this.#axis = axis;
     setText(this.#position, reading(axis.position, axis));
+    setText(this.#scaled, this.#inMeasure(axis));
     const condition = axis.lost ? "lost" : axis.fault ? "in fault" : axis.moving ? "moving" : axis.homed ? "homed" : "not homed";
     setText(this.#condition, condition);
     this.#condition.dataset.kind = condition;
@@ -109,14 +116,23 @@ class Card {
     setText(this.#error, axis.lost ?? axis.fault ?? axis.last_error ?? "");
   }
 
+  /** Return what a reading in counts is in mm or degrees, by the active calibration. */
+  #inMeasure(axis) {
+    const scale = this.#scales.get(axis.name);
+    if (this.#measure.unit !== axis.unit || axis.unit in STEPS || scale === null || axis.position === null) return "";
+    return `≈ ${quantity(axis.position * scale, axis.kind === "revolute" ? "deg" : "mm", 3)}`;
+  }
+
   #bar() {
     const [low, high] = this.#axis.limits;
+    const { factor, unit, digits } = this.#measure;
+    const limit = (value) => quantity(Number((value * factor).toFixed(digits)), unit, null);
     return h(
       "div",
       { class: "travel" },
       h("div", { class: "bar" }, this.#marker),
-      h("span", {}, reading(low, this.#axis)),
-      h("span", {}, reading(high, this.#axis)),
+      h("span", {}, limit(low)),
+      h("span", {}, limit(high)),
     );
   }
 

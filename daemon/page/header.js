@@ -50,14 +50,14 @@ function tellLease(page, element, state) {
   const may = state.you.may.includes("move");
   const who = state.you.key === null ? null : h("p", { class: "who" }, `${state.you.key}, ${state.you.role} `, signOut(page));
   if (lease === null) {
-    fill(element, who, h("p", {}, "Nobody moves"), may && button("Take control", () => page.lease.take()));
+    fill(element, who, h("p", {}, "Nobody has control"), may && button("Take control", () => page.lease.take()));
   } else if (state.you.holds_lease) {
-    fill(element, who, h("p", {}, h("strong", {}, "You may move")), button("Give back", () => page.lease.release()));
+    fill(element, who, h("p", {}, h("strong", {}, "You have control")), button("Give back", () => page.lease.release()));
   } else if (lease.expires_at === null) {
-    fill(element, who, h("p", {}, "The run moves"));
+    fill(element, who, h("p", {}, "The run has control"));
   } else {
     const over = () => page.lease.take({ over: true });
-    fill(element, who, h("p", {}, `“${lease.owner}” may move`), may && button("Take over", over));
+    fill(element, who, h("p", {}, `“${lease.owner}” has control`), may && button("Take over", over));
   }
 }
 

@@ -50,7 +50,7 @@ export class Page {
     const { stop, lease } = state.rig;
     if (stop.latched) return "A stop is latched: acknowledge it first, at the top of the page.";
     if (lease !== null && lease.expires_at === null) return "A calibration run moves the rig: wait, or cancel it.";
-    if (lease !== null && !this.lease.held) return `“${lease.owner}” may move now: wait, or take over, at the top.`;
+    if (lease !== null && !this.lease.held) return `“${lease.owner}” has control: wait, or take over, at the top.`;
     return null;
   }
 

@@ -1,6 +1,7 @@
 /** The live picture, the target drawn where it is found, and in words whether it is good to measure in. */
 
 import { socketAddress } from "./api.js";
+import { Coverage } from "./coverage.js";
 import { fill, h, setText } from "./elements.js";
 
 /** Milliseconds for which something must be so before it is said: not every flicker is news. */
@@ -15,15 +16,26 @@ export function mountPicture(element, page, signal) {
   const rate = h("span", { class: "rate" });
   const words = h("p", { role: "status", class: "words" });
   const details = h("ul", { class: "faults" });
-  const overlay = h("input", { type: "checkbox", id: "overlay", checked: true });
+  const marks = h("input", { type: "checkbox", checked: true });
+  const layer = h("input", { type: "checkbox" });
+  const covered = h("div", { class: "coverage" });
   fill(
     element,
-    h("div", { class: "panel-head" }, h("h2", { id: "picture-title" }, "Camera"), rate, h("label", {}, overlay, " Show the target")),
+    h(
+      "div",
+      { class: "panel-head" },
+      h("h2", { id: "picture-title" }, "Camera"),
+      rate,
+      h("label", {}, marks, " Target"),
+      h("label", {}, layer, " Coverage"),
+    ),
     h("div", { class: "frame" }, canvas, empty),
     words,
     details,
+    covered,
   );
-  const view = new View(canvas);
+  const coverage = new Coverage(covered, page, signal, () => view.draw());
+  const view = new View(canvas, () => marks.checked, coverage);
   const health = new Health(words, details);
   const arrivals = [];
 
@@ -42,11 +54,12 @@ export function mountPicture(element, page, signal) {
   function show(bitmap, head = null) {
     empty.hidden = bitmap !== null;
     canvas.hidden = bitmap === null;
-    view.show(bitmap, head, overlay.checked);
+    view.show(bitmap, head);
     if (head?.detection) health.follow(head.detection);
   }
 
-  overlay.addEventListener("change", () => view.draw(overlay.checked), { signal });
+  marks.addEventListener("change", () => view.draw());
+  layer.addEventListener("change", () => page.attempt(() => coverage.show(layer.checked)));
   const counting = setInterval(() => {
     const seconds = (arrivals.at(-1) - arrivals[0]) / 1000;
     const isLive = arrivals.length > 1 && performance.now() - arrivals.at(-1) < COUNTED;
@@ -118,22 +131,27 @@ class Feed {
 /** A picture and what is drawn over it. */
 class View {
   #canvas;
+  #marked;
+  #coverage;
   #bitmap = null;
   #head = null;
 
-  constructor(canvas) {
+  /** `marked` says whether the points of the target are drawn. */
+  constructor(canvas, marked, coverage) {
     this.#canvas = canvas;
+    this.#marked = marked;
+    this.#coverage = coverage;
   }
 
-  /** Show a picture, none where `bitmap` is null, with the points of its detection where `marked`. */
-  show(bitmap, head, marked) {
+  /** Show a picture, none where `bitmap` is null. */
+  show(bitmap, head) {
     this.#bitmap?.close();
     this.#bitmap = bitmap;
     this.#head = head;
-    this.draw(marked);
+    this.draw();
   }
 
-  draw(marked) {
+  draw() {
     const canvas = this.#canvas;
     if (this.#bitmap === null) {
       canvas.width = canvas.width; // clears it
@@ -144,7 +162,8 @@ class View {
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const context = canvas.getContext("2d");
     context.drawImage(this.#bitmap, 0, 0);
-    const points = marked ? (detection?.pixels ?? []) : [];
+    this.#coverage.draw(context, width, height);
+    const points = this.#marked() ? (detection?.pixels ?? []) : [];
     canvas.dataset.points = points.length;
     drawPoints(context, points, width / (canvas.clientWidth || width));
   }

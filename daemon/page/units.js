@@ -3,10 +3,10 @@
 const LENGTHS = { m: 1000, cm: 10, mm: 1, um: 1e-3, in: 25.4 };
 const ANGLES = { rad: 180 / Math.PI, mrad: 0.18 / Math.PI, deg: 1, turn: 360, rev: 360 };
 
-/** Return `value` with `digits` after the point. */
+/** Return `value` with `digits` after the point; with as many as it has where they are null. */
 export function number(value, digits = 2) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  const text = value.toFixed(digits);
+  const text = digits === null ? String(value) : value.toFixed(digits);
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 

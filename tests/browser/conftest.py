@@ -7,21 +7,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
+from tests.browser.chromium import CHROMIUM, chromium
 from tests.browser.daemons import Daemon
 
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
 AXE_VERSION = "4.14.1"
 CACHE = Path(__file__).parents[2] / ".npm-for-tests"
 """Where npm puts what the tests need of it."""
@@ -40,10 +30,8 @@ def missing(what: str) -> None:
 def browser() -> Iterator[Browser]:
     if not Path(CHROMIUM).exists():
         missing("chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""A daemon in a process of its own, on a small rig, that can be killed and started again under the open page."""
+"""A daemon in a process of its own, that can be killed and started again under the open page."""
 
 import re
 import signal
@@ -12,10 +12,13 @@ ACTIVECAM = (sys.executable, "-c", "from daemon.cli import main; main()")
 
 
 class Daemon:
-    """`activecam serve` on the small rig; `keys` is whether everybody is asked for one."""
+    """`activecam serve` on `profile`, by default a small rig that is slow enough to be stopped on its way.
 
-    def __init__(self, folder: Path, *, keys: bool = False, time_scale: float = 4.0) -> None:
-        self._profile = write_profile(folder, time_scale=time_scale)
+    `keys` is whether everybody is asked for one.
+    """
+
+    def __init__(self, folder: Path, profile: str | None = None, *, keys: bool = False) -> None:
+        self._profile = profile or str(write_profile(folder, time_scale=1.0, velocity=20.0))
         self._data = folder / "data"
         self._keys = keys
         self._port = 0
@@ -24,7 +27,7 @@ class Daemon:
 
     def start(self) -> None:
         """Serve, at the address of before if there was one, and return when requests are answered."""
-        command = [*ACTIVECAM, "serve", "--profile", str(self._profile), "--data", str(self._data)]
+        command = [*ACTIVECAM, "serve", "--profile", self._profile, "--data", str(self._data)]
         command += ["--port", str(self._port), *(["--keys"] if self._keys else [])]
         self._process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
@@ -33,6 +36,11 @@ class Daemon:
         found = re.search(r"(http://[\w.]+:(\d+))/api", self._process.stdout.readline())
         assert found is not None, "the daemon did not start"
         self.address, self._port = f"{found[1]}/", int(found[2])
+
+    @property
+    def running(self) -> bool:
+        """Whether it was started and has not ended."""
+        return self._process is not None and self._process.poll() is None
 
     def kill(self) -> None:
         """End it as a power cut would."""

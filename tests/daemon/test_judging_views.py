@@ -62,6 +62,21 @@ async def test_a_run_under_way_tells_how_well_each_view_agrees_with_itself(
         assert 0 < view["residual_px"] < 0.3
 
 
+async def test_the_coverage_of_a_run_grows_with_its_views(
+    client: httpx.AsyncClient, service: Service
+) -> None:
+    started = await service.runs.start()
+    none = (await client.get(f"/runs/{started.id}/coverage")).json()
+    assert (none["views"], none["covered"], none["missing"]) == (0, 0.0, ["no view shows the target"])
+    run, _ = await finish(service, started)
+    all_views = (await client.get(f"/runs/{run.id}/coverage")).json()
+    assert all_views["views"] == 10
+    assert sum(map(sum, all_views["cells"])) == 10 * 20
+    assert 0 < all_views["covered"] < 1
+    assert 0 < all_views["x"] <= 1
+    assert (await client.get("/runs/none/coverage")).json()["code"] == "unknown_run"
+
+
 async def test_the_target_is_looked_for_once_in_each_picture(
     client: httpx.AsyncClient, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
