@@ -54,7 +54,7 @@ screenshots: $(VENV)/.installed-dev ## The page in each of its states, as PNG in
 bench-peers: $(VENV)/.installed-dev $(PEERS)/.installed ## The calibration beside other packages, which need an environment of their own
 	$(BIN)/python -m benchmarks peers
 
-figures: $(VENV)/.installed-docs ## The documentation's measured figures, drawn anew
+figures: $(VENV)/.installed-dev ## The documentation's measured figures, drawn anew
 	$(BIN)/python -m benchmarks.uncertainty_figure docs/explanation/uncertainty.svg
 
 $(VENV)/bin/python:
@@ -66,10 +66,6 @@ $(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[dev]' --constraint constraints.txt
-	touch $@
-
-$(VENV)/.installed-docs: $(VENV)/.installed-dev
-	$(BIN)/python -m pip install --quiet --editable '.[docs]' --constraint constraints.txt
 	touch $@
 
 $(PEERS)/.installed: benchmarks/peers-requirements.txt

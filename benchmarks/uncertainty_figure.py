@@ -1,4 +1,4 @@
-"""The figure of `uncertainty`, with the extra `docs`: `python -m benchmarks.uncertainty_figure FILE.svg`."""
+"""The figure of `uncertainty`: `python -m benchmarks.uncertainty_figure FILE.svg`."""
 
 import sys
 from pathlib import Path

@@ -10,11 +10,12 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 
-from calib.errors import FormatError
+from calib.errors import CalibError, FormatError
 from daemon.api.calibrations import CalibrationId
 from daemon.api.dependencies import ServiceDep
 from daemon.api.problems import answers
 from daemon.errors import (
+    DaemonError,
     ExportUnavailableError,
     StoreError,
     UnknownCalibrationError,
@@ -90,6 +91,9 @@ async def get_export(
     """Answer with the file, to be saved under its name and the time at which the calibration was made."""
     export = export_named(name)
     subject = await _subject(service, calibration_id)
+    if export.looks:
+        with contextlib.suppress(CalibError, DaemonError):  # the report says itself why it has none
+            subject = replace(subject, misses=await service.judge.residuals(calibration_id))
     content = await in_worker(lambda: make(export, subject, camera))
     headers = {"Content-Disposition": f'attachment; filename="{_file_name(subject.made_at, name)}"'}
     if isinstance(content, bytes):

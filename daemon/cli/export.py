@@ -1,6 +1,5 @@
 """`activecam export`: a calibration as the files that others read."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -77,7 +76,6 @@ def _subject(file: Path, session: Path | None, profile: str | None) -> Subject:
         calibration=calibration,
         document=file.read_bytes(),
         folder=folder,
-        made_at=datetime.fromtimestamp(file.stat().st_mtime, UTC),
         rig=None if described is None else described.name,
         axes={} if described is None else axes_of(described.model_dump()),
     )

@@ -25,6 +25,8 @@ class Export:
     make: Callable[[Subject, str | None], Content]
     notes: Callable[[Subject, str | None], list[str]] = lambda _, __: []
     """Sentences on what the file cannot say of the calibration."""
+    looks: bool = False
+    """Whether it is made sooner where the subject knows what every point is off by."""
     size: Callable[[Subject, str | None], int | None] | None = None
     """How large it is, None where that takes making it; raises as `make` does. None to make it and see."""
 
@@ -43,7 +45,40 @@ def _session_size(subject: Subject, _: str | None) -> None:
     subject.session_folder()
 
 
+def _report_size(_: Subject, __: str | None) -> None:
+    """Return nothing: a report is always to be had, and takes seconds to make."""
+
+
+def _report_html(subject: Subject, _: str | None) -> bytes:
+    # With matplotlib and the solver, which a daemon that serves poses does without.
+    from daemon.export.report import html, report
+
+    return html(report(subject))
+
+
+def _report_pdf(subject: Subject, _: str | None) -> bytes:
+    from daemon.export.report import pdf, report
+
+    return pdf(report(subject))
+
+
 EXPORTS: Final = (
+    Export(
+        "report.pdf",
+        "application/pdf",
+        "a report for the lab book",
+        _report_pdf,
+        looks=True,
+        size=_report_size,
+    ),
+    Export(
+        "report.html",
+        "text/html",
+        "the same for a browser, in one file",
+        _report_html,
+        looks=True,
+        size=_report_size,
+    ),
     Export(
         "calibration.json",
         "application/json",

@@ -1,13 +1,16 @@
 """What is taken away: a calibration, and what is known of how it came about."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calib import Calibration
 from daemon.errors import ExportUnavailableError
+
+if TYPE_CHECKING:
+    from calib.residual_map import ViewMisses
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class Subject:
     """Where the session that it was solved from should be."""
     verification: str | None = None
     """What its run's held-out views said of it, as JSON."""
+    misses: "Sequence[ViewMisses] | None" = None
+    """What every point of the session is off by, where somebody has looked already."""
     id: str | None = None
     made_at: datetime | None = None
     rig: str | None = None

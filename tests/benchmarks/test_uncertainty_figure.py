@@ -4,15 +4,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import pytest
 
 from benchmarks.uncertainty import ALONG, Sampled
+from benchmarks.uncertainty_figure import draw
 
 
 def test_every_component_is_drawn_and_the_same_each_time(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib", reason="the extra 'docs' is not installed")
-    from benchmarks.uncertainty_figure import draw
-
     claimed = np.arange(1, 7) * np.ones((len(ALONG), 1)) * 1e-3
     files = [tmp_path / "a.svg", tmp_path / "b.svg"]
     for file in files:

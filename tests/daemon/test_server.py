@@ -373,6 +373,14 @@ main(["serve", "--profile", sys.argv[1], "--data", sys.argv[2], "--port", "0"])
     loaded = set(done.stdout.split())
     assert {"fastapi", "drivers.simulated.camera"} <= loaded
     assert (
-        not {"scipy", "rich", "calib.solver", "calib.detection.detector", "drivers.grbl", "daemon.printing"}
+        not {
+            "scipy",
+            "rich",
+            "matplotlib",
+            "calib.solver",
+            "calib.detection.detector",
+            "drivers.grbl",
+            "daemon.printing",
+        }
         & loaded
     )

@@ -74,9 +74,9 @@ def test_what_a_format_leaves_out_is_a_warning(
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "give names, of calibration.json"),
-        (["--all", "rig.urdf"], "give names, of calibration.json"),
-        (["rig.usd"], "there is no export 'rig.usd'; there are calibration.json"),
+        ([], "give names, of report.pdf"),
+        (["--all", "rig.urdf"], "give names, of report.pdf"),
+        (["rig.usd"], "there is no export 'rig.usd'; there are report.pdf"),
     ],
 )
 def test_a_wrong_call_is_one(

@@ -1,5 +1,6 @@
 """What a daemon's calibrations are taken away as, over HTTP: whole and under the right name, or a sentence why not."""
 
+import html
 import io
 import json
 import zipfile
@@ -15,6 +16,7 @@ from daemon.api import create_app
 from daemon.export import EXPORTS
 from daemon.profile import Profile
 from daemon.service import Service, running_service
+from tests.daemon.export.test_report import text_of
 from tests.daemon.export.test_urdf import robot_of
 from tests.daemon.runs import finish
 from tests.daemon.snapshots import restore_snapshot
@@ -49,6 +51,10 @@ async def test_a_runs_calibration_is_taken_away(
     slide = stored.read().joints[0]
     assert robot.robot.name == "small-rig"
     assert robot.joint_map["slide"].limit.upper == pytest.approx(LIMITS_MM[1] * slide.scale)
+    for words in (run.owner, run.note, run.id, stored.read().quality.verdict):
+        assert words in text_of(files["report.pdf"])
+        assert html.escape(words) in files["report.html"].decode()
+    assert b"by direction (left)" in files["report.html"]
     assert yaml.safe_load(files["camera_info.yaml"])["image_width"] == 480
     with zipfile.ZipFile(io.BytesIO(files["session.zip"])) as archive:
         assert archive.testzip() is None
@@ -88,7 +94,10 @@ async def test_what_there_is_not_is_not_found(client: httpx.AsyncClient, old: ht
     assert (unknown.status_code, unknown.json()["code"]) == (404, "unknown_calibration")
     unknown = await old.get("/exports/rig.usd")
     assert (unknown.status_code, unknown.json()["code"]) == (404, "unknown_export")
-    assert "there are calibration.json, session.zip, rig.urdf" in unknown.json()["detail"]
+    assert (
+        "there are report.pdf, report.html, calibration.json, session.zip, rig.urdf"
+        in unknown.json()["detail"]
+    )
     refused = await old.get("/exports/opencv.yaml?camera=left")
     assert (refused.status_code, refused.json()["code"]) == (409, "export_unavailable")
     assert "there is no camera 'left'" in refused.json()["detail"]
