@@ -39,7 +39,11 @@ def _add_access(connection: Connection) -> None:
     )
 
 
-MIGRATIONS: Final[tuple[Migration, ...]] = (_add_answers, _add_access)
+def _add_checksums(connection: Connection) -> None:
+    connection.exec_driver_sql("ALTER TABLE calibrations ADD COLUMN checksum TEXT")
+
+
+MIGRATIONS: Final[tuple[Migration, ...]] = (_add_answers, _add_access, _add_checksums)
 """The first takes schema 1 to schema 2, and so on."""
 
 

@@ -1,5 +1,6 @@
 """What the store gives out: records that no longer touch the database."""
 
+import hashlib
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -51,6 +52,11 @@ class RunRecord:
     calibration_id: str | None = None
 
 
+def checksum_of(document: str) -> str:
+    """Return the SHA-256 of a document, in hexadecimal digits."""
+    return hashlib.sha256(document.encode()).hexdigest()
+
+
 @dataclass(frozen=True, slots=True)
 class StoredCalibration:
     """What a calibration is stored under."""
@@ -78,9 +84,13 @@ class CalibrationRecord(StoredCalibration):
     """The calibration's JSON."""
     verification: str | None = None
     """What the held-out views said (JSON), None where there were none."""
+    checksum: str | None = None
+    """The document's SHA-256 when it was stored, in hexadecimal digits; None where none was kept."""
 
     def read(self) -> Calibration:
-        """Return the calibration; raises FormatError where its document is damaged."""
+        """Return the calibration; raises FormatError where its document is damaged, if only by a digit."""
+        if self.checksum is not None and self.checksum != checksum_of(self.document):
+            raise FormatError(f"calibration '{self.id}' is damaged: its document is not what was stored")
         try:
             return Calibration.model_validate_json(self.document)
         except ValidationError as error:

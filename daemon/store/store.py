@@ -13,7 +13,13 @@ from daemon.store.answers import StoredAnswers
 from daemon.store.audit import StoredAudit
 from daemon.store.database import Database
 from daemon.store.keys import StoredKeys
-from daemon.store.records import CalibrationRecord, CalibrationSummary, RunRecord, RunState
+from daemon.store.records import (
+    CalibrationRecord,
+    CalibrationSummary,
+    RunRecord,
+    RunState,
+    checksum_of,
+)
 from daemon.store.tables import CalibrationRow, RunRow
 
 
@@ -172,7 +178,7 @@ def _add(session: Session, calibration: CalibrationRecord) -> None:
     if calibration.active:
         _deactivate_all(session)
     fields = {name: getattr(calibration, name) for name in CalibrationRecord.__dataclass_fields__}
-    session.add(CalibrationRow(**fields))
+    session.add(CalibrationRow(**fields | {"checksum": checksum_of(calibration.document)}))
     session.flush()  # before the run that refers to it
 
 
@@ -215,5 +221,12 @@ def _run(row: RunRow) -> RunRecord:
 
 def _calibration(row: CalibrationRow) -> CalibrationRecord:
     return CalibrationRecord(
-        row.id, row.created_at, row.method, row.active, row.run_id, row.document, row.verification
+        row.id,
+        row.created_at,
+        row.method,
+        row.active,
+        row.run_id,
+        row.document,
+        row.verification,
+        row.checksum,
     )

@@ -77,6 +77,8 @@ class CalibrationRow(Table):
     """What the held-out views said, as JSON."""
     active: Mapped[bool]
     run_id: Mapped[str | None]
+    checksum: Mapped[str | None]
+    """The document's SHA-256, in hexadecimal digits; None where it was stored by an activecam that kept none."""
 
 
 class ApiKeyRow(Table):

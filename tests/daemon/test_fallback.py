@@ -20,7 +20,7 @@ from daemon.pose import ActiveCalibration
 from daemon.profile import Profile
 from daemon.service import Service, running_service
 from daemon.store import Store
-from tests.daemon.snapshots import restore_snapshot
+from tests.daemon.snapshots import VERSIONS, restore_snapshot
 from tests.daemon.spoiling import spoil
 
 ACTIVE, BEFORE = "c5a1f0d3b2764b1f9a0cb6f7d3a9e812", "1087d24108964e429a2ba048f07a4efa"
@@ -33,6 +33,8 @@ DAMAGES = {
     "of a later format": "json_replace(document, '$.format', 'activecam.calibration/9')",
     "of another rig": OTHER_JOINTS,
 }
+ANOTHER_DIGIT = "replace(document, '0.0010000227', '0.0010000237')"
+"""The slide's scale, 1 in a million larger."""
 
 
 @pytest.fixture
@@ -87,6 +89,28 @@ async def test_a_damaged_one_gives_way_to_the_one_before_it(
         if damage != "of another rig":
             assert one["code"] in {"calibration_damaged", "store_unavailable"}
         assert (await asked(service, "/calibrations/current"))["active"] is True
+
+
+async def test_a_digit_that_is_another_is_noticed(tmp_path: Path, profile: Profile) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    restore_snapshot(VERSIONS[-1], data)
+    change(data, ACTIVE, ANOTHER_DIGIT)
+    async with running_service(profile, data) as service:
+        assert service.poses.calibration_id == BEFORE
+        assert (
+            f"calibration '{ACTIVE}' is damaged: its document is not what was stored" in service.problems[-1]
+        )
+        for address, method in (("", "GET"), ("/activate", "POST")):
+            refused = await asked(service, f"/calibrations/{ACTIVE}{address}", method)
+            assert refused["code"] == "calibration_damaged"
+        assert (await asked(service, "/calibrations/current"))["id"] == BEFORE
+
+
+async def test_a_document_without_a_checksum_is_taken_as_it_is(data: Path, profile: Profile) -> None:
+    change(data, ACTIVE, ANOTHER_DIGIT)
+    async with running_service(profile, data) as service:
+        assert service.poses.calibration_id == ACTIVE
 
 
 async def test_it_is_said_until_a_person_has_chosen(data: Path, profile: Profile) -> None:
