@@ -133,12 +133,22 @@ class Clients(RuleBasedStateMachine):
         motion=motions,
         then=st.lists(anything, max_size=2),
         turns=st.integers(0, 8),
+        seconds=st.sampled_from([0.0, 0.0, 0.05, 1.0]),
     )
     def set_in_motion(
-        self, who: str, ttl: float, homed: bool, motion: Request, then: list[Request], turns: int
+        self,
+        who: str,
+        ttl: float,
+        homed: bool,
+        motion: Request,
+        then: list[Request],
+        turns: int,
+        seconds: float,
     ) -> None:
-        """Bring about all that a client's motion needs, and ask for more while it begins."""
-        self._run(self._set_in_motion(who, ttl, homed, [replace(motion, shows=who), *then], turns))
+        """Bring about all that a client's motion needs, ask for more while it begins, and let it go on for a while."""
+        asked = [replace(motion, shows=who), *then]
+        self._run(self._set_in_motion(who, ttl, homed, asked, turns))
+        self.wait(seconds)
 
     @rule(request=keyed, at_once=st.booleans())
     def ask_again(self, request: Request, at_once: bool) -> None:
@@ -276,6 +286,10 @@ class Clients(RuleBasedStateMachine):
 
     async def _begin_a_run(self, resumed: bool, fault: str | None, seconds: float) -> None:
         await self._make_sound()
+        if resumed:  # by a stop
+            await self._ask([Request("POST", "/runs", shows="anna")], 0)
+            await self._follow("view", 1)
+            await self._make_sound()
         if fault is not None:
             self._adversary.faults[fault]()
             await asyncio.sleep(seconds)
@@ -326,4 +340,4 @@ def _of(ids: list[str], which: int) -> str:
 
 
 TestClients = Clients.TestCase
-TestClients.settings = settings(effort(8), stateful_step_count=30)
+TestClients.settings = settings(effort(12), stateful_step_count=30)

@@ -96,13 +96,11 @@ class Watch:
             self._under_way.pop(axis, None)
             return
         lease, run = self._service.leases.current, fields_now().get("run")
-        holds = lease is not None and (
-            lease.owner == f"run {run}" if run is not None else lease.token == SHOWN.get()
-        )
-        if not holds:
-            self.broken.append(
-                f"axis '{axis}' was moved under the lease {lease}, shown was {run or SHOWN.get()}"
-            )
+        token = lease.token if lease is not None and lease.owner == f"run {run}" else SHOWN.get()
+        held = lease is not None and lease.token == token
+        # What was on its way when the lease ended is to be braked, as all that moves then.
+        if not held and motion.began > self._ended.get(token or "", -math.inf) + AT_ONCE:
+            self.broken.append(f"axis '{axis}' was moved under the lease {lease}, shown was {run or token}")
         if self._service.rig.latch.engaged:
             self.broken.append(f"axis '{axis}' was moved while the stop was latched")
         if before.ends > motion.began:
@@ -112,7 +110,7 @@ class Watch:
             self.broken.append(f"axis '{axis}' was sent to {motion.target:g}")
         if run is not None:
             self.runs.commanded(run, axis)
-        self._under_way[axis] = Command(axis, motion, None if lease is None else lease.token, run)
+        self._under_way[axis] = Command(axis, motion, token, run)
 
     def _moving(self) -> list[Command]:
         now = self._service.rig.clock.now()

@@ -25,6 +25,8 @@ ALLOWED: dict[RunState | None, set[RunState]] = {
     **{state: {RUNNING, *ENDS} for state in (RunState.FAILED, RunState.CANCELLED, RunState.INTERRUPTED)},
 }
 """The states that may follow each; None is that of a run that has told nothing yet."""
+ROUNDING = 1e-9
+"""Seconds by which two times of the rig's clock may be closer than they were set to be."""
 MOVES = {"homing", "joint", "moving"}
 """The events after which axes move."""
 
@@ -130,7 +132,7 @@ class RunWatch:
             self.broken.append(f"{folder.name}: pictures are lost: {gone}")
         for view in session.views:
             settled = (view.model_extra or {})["settle"]["settled_s"]
-            if settled < self._service.profile.procedure.settle:
+            if settled < self._service.profile.procedure.settle - ROUNDING:
                 self.broken.append(
                     f"{folder.name}: {view.image} was taken {settled:.3f} s after the standstill"
                 )
