@@ -12,6 +12,7 @@ from daemon.profile import Profile
 from daemon.rig import Devices, Rig, make_devices
 from daemon.service import Service, running_service
 from tests.daemon.rigs import small_rig
+from tests.daemon.sockets import on_a_socket
 
 
 @pytest.fixture
@@ -43,6 +44,20 @@ async def service(profile: Profile, devices: Devices, tmp_path: Path) -> AsyncIt
 async def client(service: Service) -> AsyncIterator[httpx.AsyncClient]:
     transport = httpx.ASGITransport(create_app(service))
     async with httpx.AsyncClient(transport=transport, base_url="http://localhost/api/v1") as client:
+        yield client
+
+
+@pytest.fixture
+async def address(service: Service) -> AsyncIterator[str]:
+    """Where the service is served on a real socket."""
+    async with on_a_socket(service) as address:
+        yield address
+
+
+@pytest.fixture
+async def http(address: str) -> AsyncIterator[httpx.AsyncClient]:
+    """A client over that socket, which shows no key of its own accord."""
+    async with httpx.AsyncClient(base_url=f"{address}/api/v1", timeout=30) as client:
         yield client
 
 

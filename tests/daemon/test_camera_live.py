@@ -3,7 +3,6 @@
 import asyncio
 import json
 import struct
-from collections.abc import AsyncIterator
 from typing import Any
 
 import cv2
@@ -13,20 +12,14 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from daemon.live_detection import LiveDetection
 from daemon.rig import Devices
-from daemon.server import address_of, bind, serving
 from daemon.service import Service
 from drivers.simulated import SimulatedCamera
 
 
 @pytest.fixture
-async def camera(service: Service) -> AsyncIterator[str]:
+def camera(address: str) -> str:
     """The socket's address."""
-    listening = bind("127.0.0.1", 0)
-    try:
-        async with serving(service, listening):
-            yield f"{address_of(listening).replace('http', 'ws')}/api/v1/camera/live"
-    finally:
-        listening.close()
+    return f"{address.replace('http', 'ws')}/api/v1/camera/live"
 
 
 async def next_picture(socket: ClientConnection) -> tuple[dict[str, Any], bytes]:

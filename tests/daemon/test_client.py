@@ -12,23 +12,12 @@ import pytest
 
 from activecam_client import Client, ProblemError, UnreachableError
 from daemon.rig import Devices
-from daemon.server import address_of, bind, serving
 from daemon.service import Service
 from drivers.simulated import SimulatedController
 from tests.daemon.calibrations import calibrate
 from tests.daemon.motions import home_all, until
 
 Result = TypeVar("Result")
-
-
-@pytest.fixture
-async def address(service: Service) -> AsyncIterator[str]:
-    listening = bind("127.0.0.1", 0)
-    try:
-        async with serving(service, listening):
-            yield address_of(listening)
-    finally:
-        listening.close()
 
 
 @pytest.fixture

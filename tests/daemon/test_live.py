@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
@@ -11,20 +10,14 @@ from websockets.asyncio.client import ClientConnection, connect
 from daemon.api import live_state
 from daemon.api.live_state import LiveState
 from daemon.client_motion import ClientMotions
-from daemon.server import address_of, bind, serving
 from daemon.service import Service
 from tests.daemon.motions import until
 
 
 @pytest.fixture
-async def live(service: Service) -> AsyncIterator[str]:
+def live(address: str) -> str:
     """The socket's address."""
-    listening = bind("127.0.0.1", 0)
-    try:
-        async with serving(service, listening):
-            yield f"{address_of(listening).replace('http', 'ws')}/api/v1/live"
-    finally:
-        listening.close()
+    return f"{address.replace('http', 'ws')}/api/v1/live"
 
 
 async def message(socket: ClientConnection, kind: str) -> dict[str, Any]:

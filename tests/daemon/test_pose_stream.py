@@ -12,11 +12,11 @@ from websockets.asyncio.client import ClientConnection, connect
 from daemon.api import pose_stream
 from daemon.rig import Devices
 from daemon.rig.utc import rfc3339
-from daemon.server import address_of, bind, serving
 from daemon.service import Service
 from drivers.simulated import SimulatedController
 from tests.daemon.calibrations import calibrate
 from tests.daemon.motions import home_all, until
+from tests.daemon.sockets import on_a_socket
 
 
 @pytest.fixture
@@ -29,12 +29,8 @@ async def stream(service: Service) -> str:
 
 @pytest.fixture
 async def address(service: Service) -> AsyncIterator[str]:
-    listening = bind("127.0.0.1", 0)
-    try:
-        async with serving(service, listening):
-            yield address_of(listening).replace("http", "ws")
-    finally:
-        listening.close()
+    async with on_a_socket(service) as address:
+        yield address.replace("http", "ws")
 
 
 async def receive(socket: ClientConnection) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -37,21 +37,6 @@ from daemon.server import serve
 profile, data = load_profile(sys.argv[1]), Path(sys.argv[2])
 serve(profile, data, port=0, on_ready=lambda address: print(address, flush=True))
 """
-
-
-@pytest.fixture
-async def address(service: Service) -> AsyncIterator[str]:
-    """Where the service is served on a real socket."""
-    listening = bind("127.0.0.1", 0)
-    async with serving(service, listening):
-        yield address_of(listening)
-    listening.close()
-
-
-@pytest.fixture
-async def http(address: str) -> AsyncIterator[httpx.AsyncClient]:
-    async with httpx.AsyncClient(base_url=f"{address}/api/v1", timeout=30) as client:
-        yield client
 
 
 async def read_events(client: httpx.AsyncClient, run: str, last: int | None = None) -> list[dict[str, Any]]:

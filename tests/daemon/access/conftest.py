@@ -3,16 +3,15 @@
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import pytest
 
 from daemon.access.keys import make_key
 from daemon.access.roles import Role
 from daemon.profile import Profile
 from daemon.rig import Devices
-from daemon.server import address_of, bind, serving
 from daemon.service import Service, running_service
 from daemon.store import Store
+from tests.daemon.sockets import on_a_socket
 
 
 @pytest.fixture
@@ -37,17 +36,8 @@ async def guarded(
 @pytest.fixture
 async def address(guarded: Service) -> AsyncIterator[str]:
     """Where it is served on a real socket."""
-    listening = bind("127.0.0.1", 0)
-    async with serving(guarded, listening):
-        yield address_of(listening)
-    listening.close()
-
-
-@pytest.fixture
-async def http(address: str) -> AsyncIterator[httpx.AsyncClient]:
-    """A client that shows no key of its own accord."""
-    async with httpx.AsyncClient(base_url=f"{address}/api/v1", timeout=30) as client:
-        yield client
+    async with on_a_socket(guarded) as address:
+        yield address
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ import pytest
 from daemon.access.roles import Role
 from tests.daemon.access.commands import ALL, command
 from tests.daemon.access.keys import bearer
+from tests.daemon.processes import daemon_process
 from tests.daemon.rigs import write_profile
 from tests.daemon.snapshots import restore_snapshot
 
@@ -61,33 +61,11 @@ def keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> dict[Role, str]:
 @pytest.fixture
 def served(tmp_path: Path, other: tuple[str, str], keys: dict[Role, str]) -> Iterator[str]:
     """The address of a daemon that serves the other machine."""
-    serve = [
-        sys.executable,
-        "-c",
-        "from daemon.cli import main; main()",
-        "serve",
-        "--host",
-        other[1],
-        "--port",
-        "0",
-    ]
-    serve += [
-        "--profile",
-        str(write_profile(tmp_path, max_reading_age="1000 s")),
-        "--data",
-        str(tmp_path / "data"),
-    ]
-    with subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        try:
-            found = re.search(r"http://[\d.:]+", process.stdout.readline())
-            assert found is not None
-            yield found[0]
-        finally:
-            process.terminate()
-            _, log = process.communicate()
-    assert "CAN READ THE KEYS" in log
-    assert not any(key in log for key in keys.values())
+    profile = write_profile(tmp_path, max_reading_age="1000 s")
+    with daemon_process(profile, tmp_path / "data", "--host", other[1]) as daemon:
+        yield daemon.address
+    assert "CAN READ THE KEYS" in daemon.log
+    assert not any(key in daemon.log for key in keys.values())
 
 
 def test_a_viewer_elsewhere_reads_the_pose_and_does_nothing_else(

@@ -11,20 +11,19 @@ from websockets.exceptions import InvalidStatus
 
 from daemon.api import create_app
 from daemon.api.guard import LARGEST_BODY
-from daemon.server import LARGEST_MESSAGE, Door, address_of, bind, serving
+from daemon.server import LARGEST_MESSAGE, Door
 from daemon.service import Service
 from tests.daemon.access.asking import status_of
 from tests.daemon.access.keys import close_code
+from tests.daemon.sockets import on_a_socket
 
 LOCAL = "http://localhost"
 
 
 @pytest.fixture
 async def address(service: Service) -> AsyncIterator[str]:
-    listening = bind("127.0.0.1", 0)
-    async with serving(service, listening, Door(["rig.lab"])):
-        yield address_of(listening)
-    listening.close()
+    async with on_a_socket(service, Door(["rig.lab"])) as address:
+        yield address
 
 
 async def test_the_daemon_answers_to_addresses_and_to_its_names(service: Service) -> None:

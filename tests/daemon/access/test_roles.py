@@ -64,6 +64,8 @@ def test_whoever_is_no_operator_may_only_read() -> None:
         "POST /project",
         "POST /rays",
         "WS /pose/stream",
+        "WS /camera/live",
+        "WS /live",  # whose commands are requests of their own
         "POST /session",
         "DELETE /session",
     }
