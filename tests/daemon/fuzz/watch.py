@@ -43,6 +43,8 @@ class Watch:
         self._under_way: dict[str, Command] = {}
         self._ended: dict[str, float] = {}
         self._latched = math.inf
+        self._away: dict[str, float] = {}
+        """Until when each axis was lost, and may have been moved by hand (rig's clock, s)."""
         service.leases.on_end(self._lease_ended)
         service.rig.latch.on_engage(self._engaged)
         self._stack = contextlib.ExitStack()
@@ -82,7 +84,7 @@ class Watch:
             assert read is not None
             if axis.lost is not None or now - self._adversary.silent_since.get(name, now) > allowed:
                 self.broken.append(f"a pose was given while axis '{name}' did not answer")
-            lost = self._adversary.power_lost.get(name, -math.inf)
+            lost = max(self._adversary.power_lost.get(name, -math.inf), self._away.get(name, -math.inf))
             if lost < read and not any(
                 lost <= home.began and home.ends <= read for home in self._adversary.homings[name]
             ):
@@ -126,6 +128,7 @@ class Watch:
             await rig.changed.wait()
             now = rig.clock.now()
             current = self._service.leases.current
+            self._away |= {axis.spec.name: now for axis in rig.snapshot.axes if axis.lost and axis.timestamp}
             for axis, command in list(self._under_way.items()):
                 if now >= command.motion.ends:
                     del self._under_way[axis]
