@@ -213,6 +213,7 @@ class Health {
   }
 
   say(kind, text, details) {
+    if (kind !== this.#said) this.#words.dispatchEvent(new Event("health", { bubbles: true }));
     this.#said = kind;
     this.#words.dataset.kind = kind === "true" ? "good" : "poor";
     setText(this.#words, text);
