@@ -25,7 +25,7 @@ from daemon.service import Service, running_service
 from tests.daemon.calibrations import calibration_of
 from tests.daemon.fuzz.adversary import Adversary
 from tests.daemon.fuzz.effort import effort
-from tests.daemon.fuzz.requests import CLIENTS, Request, anything, keyed, motions, ttls
+from tests.daemon.fuzz.requests import CLIENTS, Request, anything, keyed, motions, steering, ttls
 from tests.daemon.fuzz.virtual_time import LoopClock, VirtualTimeLoop
 from tests.daemon.fuzz.watch import SHOWN, Watch
 from tests.daemon.motions import until
@@ -121,10 +121,14 @@ class Clients(RuleBasedStateMachine):
         resumed=st.booleans(),
         fault=st.sampled_from([None, None, *FAULTS]),
         seconds=st.sampled_from([0.0, 0.3, 1.0, 2.0, 4.0]),
+        then=st.lists(steering, max_size=2),
     )
-    def begin_a_run(self, resumed: bool, fault: str | None, seconds: float) -> None:
-        """Bring about all that a run needs, which chance hardly does, and let it go on for a while."""
+    def begin_a_run(self, resumed: bool, fault: str | None, seconds: float, then: list[Request]) -> None:
+        """Bring about all that a run needs, which chance hardly does, let it go on for a while, and steer it."""
         self._run(self._begin_a_run(resumed, fault, seconds))
+        for request in then:
+            self._run(self._ask([request], 0))
+            self.wait(0.5)
 
     @rule(
         who=st.sampled_from(CLIENTS),
@@ -210,9 +214,10 @@ class Clients(RuleBasedStateMachine):
 
     async def _send(self, request: Request, worded: httpx.Request) -> httpx.Response:
         SHOWN.set(worded.headers.get("X-Lease"))
-        problems = self._service.rig.snapshot.problems
+        problems, stops = self._service.rig.snapshot.problems, self._watch.stops
         answer = await self._http.send(worded)
         assert answer.status_code < 500 or answer.status_code == 503, answer.text
+        assert request.path != "/stop" or self._watch.stops > stops, "a stop did not latch"
         done = request.method, request.path, answer.status_code
         if done == ("POST", "/lease", 200):
             assert request.shows is not None

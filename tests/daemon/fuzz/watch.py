@@ -42,6 +42,8 @@ class Watch:
         self._adversary = adversary
         self._under_way: dict[str, Command] = {}
         self._ended: dict[str, float] = {}
+        self.stops = 0
+        """How often everything was stopped."""
         self._latched = math.inf
         self._away: dict[str, float] = {}
         """Until when each axis was lost, and may have been moved by hand (rig's clock, s)."""
@@ -143,4 +145,5 @@ class Watch:
         self._ended[lease.token] = self._service.rig.clock.now()
 
     def _engaged(self, _: str) -> None:
+        self.stops += 1
         self._latched = self._service.rig.clock.now()
