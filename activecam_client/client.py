@@ -106,11 +106,13 @@ class Client:
         )
 
     def stream(self, camera: str | None = None, rate: float | None = None) -> Iterator[StreamedPose]:
-        """Yield a pose at each new reading, or `rate` a second at most.
+        """Yield a pose at each new reading, or `rate` a second at most; the newest, however long the last one took.
 
         Ends with the daemon. Raises ProblemError when a problem comes in the way; call it again to go on.
         """
-        for message in self._connection.messages("/pose/stream", _given(camera=camera, rate=rate)):
+        for message in self._connection.messages(
+            "/pose/stream", _given(camera=camera, rate=rate, ask="true")
+        ):
             if "code" in message:
                 raise ProblemError(message)
             yield StreamedPose.model_validate(message)

@@ -8,7 +8,7 @@ from typing import Any, Final
 from urllib.parse import urlencode
 
 import httpx
-from websockets.exceptions import ConnectionClosed, WebSocketException
+from websockets.exceptions import ConnectionClosed, ConnectionClosedOK, WebSocketException
 from websockets.sync.client import connect
 
 from activecam_client.errors import ProblemError, UnreachableError
@@ -72,15 +72,18 @@ class Connection:
                     yield json.loads(line.removeprefix("data: "))
 
     def messages(self, path: str, query: Mapping[str, str]) -> Iterator[Any]:
-        """Yield the messages of a WebSocket until the daemon ends it."""
+        """Yield the messages of a WebSocket, each when it is asked for, until the daemon ends it."""
         address = self._address.replace("http", "ws", 1) + path + ("?" + urlencode(query) if query else "")
         try:
             with connect(
                 address, additional_headers=self._headers, ssl=self._tls, open_timeout=PATIENCE
             ) as socket:
                 try:
-                    for message in socket:
-                        yield json.loads(message)
+                    while True:
+                        socket.send("next")
+                        yield json.loads(socket.recv())
+                except ConnectionClosedOK:
+                    return
                 except ConnectionClosed as error:
                     raise UnreachableError(f"{self._address} has hung up: {error}") from error
         except (OSError, WebSocketException) as error:

@@ -20,17 +20,29 @@ router = APIRouter(tags=["pose"])
 
 @router.websocket("/pose/stream")
 async def stream_pose(
-    socket: WebSocket, camera: str | None = None, rate: Annotated[float | None, Query(gt=0)] = None
+    socket: WebSocket,
+    camera: str | None = None,
+    rate: Annotated[float | None, Query(gt=0)] = None,
+    ask: bool = False,
 ) -> None:
     """Send what `GET /pose` answers at each new reading; a problem document is sent once, when it arises.
 
     `rate` is how many poses a second are sent at most. `dropped` of a pose says how many readings were left out before
-    it, since the client asked for fewer or read too slowly.
+    it, since the client asked for fewer or read too slowly. With `ask`, each of its messages asks for one: what nobody
+    has asked for does not grow old on its way.
     """
     service: Service = socket.app.state.service
     await socket.accept()
     poses = messages(service, camera, socket.url.path, 0.0 if rate is None else 1 / rate)
-    await first_of(send(socket, service.streams.follow(poses)), left(socket))
+    asked = asyncio.Semaphore(0)
+    sent = service.streams.follow(_asked_for(poses, asked) if ask else poses)
+    await first_of(send(socket, sent), left(socket, asked.release))
+
+
+async def _asked_for(poses: AsyncIterator[str], asked: asyncio.Semaphore) -> AsyncIterator[str]:
+    while True:
+        await asked.acquire()
+        yield await anext(poses)
 
 
 async def messages(service: Service, camera: str | None, address: str, period: float) -> AsyncIterator[str]:

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncGenerator, Coroutine
+from collections.abc import AsyncGenerator, Callable, Coroutine
 from typing import Any
 
 from fastapi import WebSocket, WebSocketDisconnect, status
@@ -33,7 +33,10 @@ async def send(socket: WebSocket, messages: AsyncGenerator[str | bytes | None]) 
         await socket.close(status.WS_1001_GOING_AWAY, "the daemon is shutting down")
 
 
-async def left(socket: WebSocket) -> None:
-    """Return when the client has gone, which nothing else tells while there is nothing to send."""
+async def left(socket: WebSocket, on_message: Callable[[], None] = lambda: None) -> None:
+    """Return when the client has gone, which nothing else tells while there is nothing to send.
+
+    Each of its messages until then, whatever it says, is told `on_message`.
+    """
     while (await socket.receive())["type"] != "websocket.disconnect":
-        pass
+        on_message()
