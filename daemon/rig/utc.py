@@ -14,6 +14,8 @@ STEP: Final = timedelta(milliseconds=5)
 A clock that is slewed rather than set takes the monotonic clock along."""
 AT_ONCE: Final = 1e-3
 """Seconds of life within which both clocks must have been read for their difference to mean something."""
+TRIES: Final = 10
+"""How often that is tried, where a busy machine is busy with something else in between."""
 REMEMBERED: Final = 16
 """How many settings of the machine's clock are remembered."""
 
@@ -42,16 +44,17 @@ class UtcClock:
         stamp, utc = read
         self._eras = deque([_Era(stamp, stamp, utc)], REMEMBERED)
 
-    def check(self) -> None:
-        """Notice whether the machine's clock has been set."""
+    def check(self) -> bool:
+        """Notice whether the machine's clock has been set; return whether it could be looked at."""
         read = self._read()
         if read is None:
-            return
+            return False
         stamp, utc = read
         if abs(utc - self._utc(self._eras[-1], stamp)) > STEP:
             self._eras.append(_Era(stamp, stamp, utc))
         else:
             self._eras[-1].end = stamp
+        return True
 
     def at(self, timestamp: float) -> datetime:
         """Return the UTC time of a stamp (s) of the rig's clock, in order as long as nobody sets the machine's."""
@@ -67,7 +70,9 @@ class UtcClock:
         Raises TimeNotCoveredError for a time to come, one before this clock was made, and one that a setting of the
         machine's clock has left out or made come twice.
         """
-        self.check()
+        for _ in range(TRIES):  # or a time that has passed would be one to come
+            if self.check():
+                break
         stamps = [(era, era.begin + (time - era.utc).total_seconds() * self._pace) for era in self._eras]
         found = [stamp for era, stamp in stamps if era.begin <= stamp <= era.end]
         if len(found) == 1:

@@ -112,3 +112,23 @@ def test_clocks_that_could_not_be_read_at_once_are_not_compared(
 
     monkeypatch.setattr(machine, "now", lambda zone=None: slow() if zone is None else machine.wall)
     assert clock.at(1000.0) == NOON
+
+
+def test_a_time_that_has_passed_is_known_on_a_busy_machine(
+    machine: Machine, clock: UtcClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.live(clock, 1)
+    machine.monotonic += 2
+    machine.wall += timedelta(seconds=2)
+    slow = [0.0, 0.3, 0.0, 0.3, 0.0, 0.0]  # two looks are interrupted
+
+    def now(zone: object = None) -> object:
+        if zone is not None:
+            return machine.wall
+        late = slow.pop(0) if slow else 0.0
+        machine.monotonic += late
+        machine.wall += timedelta(seconds=late)
+        return machine.monotonic
+
+    monkeypatch.setattr(machine, "now", now)
+    assert clock.stamp(NOON + timedelta(seconds=3)) == pytest.approx(1003.0)
