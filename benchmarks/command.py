@@ -23,6 +23,7 @@ NAMES: Final = (
     "start_time",
     "shutdown_time",
     "stop_under_load",
+    "page",
     "efficiency",
     "uncertainty",
     "pictures",

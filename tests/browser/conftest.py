@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
-from tests.browser.chromium import CHROMIUM, chromium
+from benchmarks.chromium import CHROMIUM, chromium
 from tests.browser.daemons import Daemon
 
 AXE_VERSION = "4.14.1"

@@ -12,7 +12,7 @@ from typing import Final
 import httpx
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.chromium import chromium
+from benchmarks.chromium import chromium
 from tests.browser.daemons import Daemon
 
 WIDTHS: Final = (1440, 800)

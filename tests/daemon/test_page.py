@@ -72,6 +72,18 @@ def test_every_file_is_used_and_all_of_them_are_small() -> None:
     assert sum(file.stat().st_size for file in FILES) < LARGEST
 
 
+def test_what_the_stop_waits_for_is_asked_for_at_once() -> None:
+    needed, found = {"main.js"}, {"main.js"}
+    while (
+        found
+    ):  # what is imported by what is imported, but for sections, which are loaded when they are shown
+        texts = [(PAGE / name).read_text(encoding="utf-8") for name in found]
+        found = {name for text in texts for name in re.findall(r'from "\./([^"]+)"', text)} - needed
+        needed |= found
+    index = (PAGE / "index.html").read_text(encoding="utf-8")
+    assert set(re.findall(r'rel="modulepreload" href="page/([^"]+)"', index)) == needed - {"main.js"}
+
+
 def test_the_wheel_has_the_page() -> None:
     root = PAGE.parents[1]
     packed = {file.distribution_path for file in WheelBuilder(str(root)).recurse_included_files()}
