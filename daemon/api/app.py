@@ -30,6 +30,7 @@ from daemon.api import (
     session,
     views,
 )
+from daemon.api.camera_live import Packing
 from daemon.api.gate import Gate
 from daemon.api.guard import Guard
 from daemon.api.live_state import LiveState
@@ -89,6 +90,7 @@ def create_app(service: Service, host_names: Collection[str] = ()) -> FastAPI:
     )
     app.state.service = service
     app.state.live_state = LiveState(service)
+    app.state.packing = Packing()
     # Routes are tried in this order, so that the pose, which is asked most, comes first.
     for part in (
         poses,

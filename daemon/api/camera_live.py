@@ -39,13 +39,29 @@ class PictureDocument(BaseModel):
         return cls(sequence=look.picture.sequence, width=width, height=height, detection=detection)
 
 
+class Packing:
+    """Looks as messages: packed once for all who look."""
+
+    def __init__(self) -> None:
+        self._packed: dict[bool, tuple[Look, bytes]] = {}
+
+    def of(self, look: Look, *, detect: bool) -> bytes:
+        """Return the message that is told of `look`."""
+        look_before, message = self._packed.get(detect, (None, b""))
+        if look_before is not look:
+            head = PictureDocument.of(look, detect=detect).model_dump_json().encode()
+            message = _packed(head, look.picture.data)
+            self._packed[detect] = look, message
+        return message
+
+
 @router.websocket("/camera/live")
 async def follow_camera(socket: WebSocket, detect: bool = False) -> None:
     """Send a picture for each message that comes; while the camera gives none, a problem document once."""
     service: Service = socket.app.state.service
     await socket.accept()
     asked = asyncio.Event()
-    pictures = _messages(service, asked, socket.url.path, detect=detect)
+    pictures = _messages(service, socket.app.state.packing, asked, socket.url.path, detect=detect)
     await first_of(send(socket, service.streams.follow(pictures)), _listen(socket, asked))
 
 
@@ -55,7 +71,7 @@ async def _listen(socket: WebSocket, asked: asyncio.Event) -> None:
 
 
 async def _messages(
-    service: Service, asked: asyncio.Event, address: str, *, detect: bool
+    service: Service, packing: Packing, asked: asyncio.Event, address: str, *, detect: bool
 ) -> AsyncIterator[bytes]:
     """Yield a message whenever `asked` is set: length of the head (4 bytes, big-endian), head (JSON), JPEG."""
     shown: int | None = None
@@ -73,9 +89,7 @@ async def _messages(
             message = _packed(to_json(problems.document(kind, str(error), address)), b"")
         else:
             shown, told = look.picture.sequence, None
-            message = _packed(
-                PictureDocument.of(look, detect=detect).model_dump_json().encode(), look.picture.data
-            )
+            message = packing.of(look, detect=detect)
             asked.clear()
         yield message
 

@@ -88,7 +88,7 @@ class Card {
         { class: "axis-controls" },
         h("div", { class: "group" }, arrow("backwards", "−", -1), step, arrow("forwards", "+", 1)),
         this.#goTo(),
-        h("button", { type: "button", onclick: () => this.#home() }, "Home", h("span", { class: "visually-hidden" }, ` ${name}`)),
+        h("button", { type: "button", class: "home", onclick: () => this.#home() }, "Home", h("span", { class: "visually-hidden" }, ` ${name}`)),
       ),
       this.#error,
     );
@@ -99,6 +99,7 @@ class Card {
     if (axis === null) {
       setText(this.#position, "–");
       setText(this.#condition, "not known");
+      delete this.#condition.dataset.kind;
       setText(this.#scaled, "");
       this.#marker.hidden = true;
       return;

@@ -5,7 +5,7 @@ import { moment } from "./units.js";
 
 export async function mount(element, page, { signal }) {
   const list = h("div", {});
-  fill(element, h("h2", {}, "Calibrations"), list);
+  fill(element, h("section", { class: "panel", "aria-labelledby": "history-title" }, h("h2", { id: "history-title" }, "Calibrations"), list));
 
   async function show() {
     const calibrations = await page.api.get("calibrations", { signal });
@@ -14,11 +14,11 @@ export async function mount(element, page, { signal }) {
       return;
     }
     const rows = calibrations.map((each) => [moment(each.created_at), each.verdict, state(each)]);
-    fill(list, table("Calibrations, the newest first", ["Made", "Verdict", "Poses"], rows));
+    fill(list, table("Calibrations, the newest first", ["Made", "Verdict", "State"], rows));
   }
 
   function state(calibration) {
-    if (calibration.active) return h("strong", {}, "computed from this");
+    if (calibration.active) return h("strong", {}, "Active");
     const activate = async () => {
       await page.api.post(`calibrations/${calibration.id}/activate`);
       await show();

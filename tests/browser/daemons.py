@@ -58,3 +58,8 @@ class Daemon:
         """Return a new key of `role`."""
         command = [*ACTIVECAM, "key", "add", role, "--role", role, "--data", str(self._data)]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    def forget_key(self, name: str) -> None:
+        """Take a key back."""
+        command = [*ACTIVECAM, "key", "remove", name, "--data", str(self._data)]
+        subprocess.run(command, check=True, capture_output=True)

@@ -3,11 +3,12 @@
 Each is taken at the width of a desk and of a tablet, in light and in dark, for whoever changes the page to look at.
 """
 
+import itertools
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Final, Literal
 
 import httpx
 from playwright.sync_api import Browser, Page, expect
@@ -17,7 +18,12 @@ from tests.browser.daemons import Daemon
 
 WIDTHS: Final = (1440, 800)
 HEIGHT: Final = 960
+Scheme = Literal["light", "dark"]
+SCHEMES: Final[tuple[Scheme, ...]] = ("light", "dark")
+PATIENCE: Final = 60_000
+"""Milliseconds that a state may take to come about; coverage looks at all pictures of a run."""
 
+expect.set_options(timeout=PATIENCE)
 State = Callable[[Page, Daemon, httpx.Client], None]
 
 
@@ -44,7 +50,7 @@ def homed(page: Page, daemon: Daemon, api: httpx.Client) -> None:
 def covered(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     ready(page, daemon, api)
     page.get_by_label("Coverage").check()
-    expect(page.get_by_role("meter").first).to_be_visible(timeout=120_000)
+    expect(page.get_by_role("meter").first).to_be_visible()
 
 
 def held_by_another(page: Page, daemon: Daemon, api: httpx.Client) -> None:
@@ -70,6 +76,21 @@ def gone(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     expect(page.get_by_text("The daemon does not answer")).to_be_visible()
 
 
+def asked_for_a_key(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    page.goto(daemon.address)
+    expect(page.get_by_label("Key")).to_be_focused()
+
+
+def seen_by_a_viewer(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    asked_for_a_key(page, daemon, api)
+    page.get_by_label("Key").fill(daemon.key("viewer"))
+    page.wait_for_timeout(1000)  # in which the daemon learns of the key
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_text("it sees everything and changes nothing")).to_be_visible()
+    expect(page.locator(".rate")).to_contain_text("pictures/s")
+    daemon.forget_key("viewer")
+
+
 STATES: Final[dict[str, State]] = {
     "rig": ready,
     "rig-homed": homed,
@@ -79,6 +100,8 @@ STATES: Final[dict[str, State]] = {
     "history": history,
     "gone": gone,
 }
+GUARDED: Final[dict[str, State]] = {"key": asked_for_a_key, "viewer": seen_by_a_viewer}
+"""Where keys are asked for."""
 
 
 def main(folder: Path) -> None:
@@ -90,17 +113,15 @@ def main(folder: Path) -> None:
         with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60) as api:
             _calibrate(api)
             for name, state in STATES.items():
-                for width in WIDTHS:
-                    for scheme in ("light", "dark"):
-                        _take(
-                            browser,
-                            daemon,
-                            api,
-                            state,
-                            folder / f"{name}-{width}-{scheme}.png",
-                            width,
-                            scheme,
-                        )
+                _take(browser, daemon, api, state, folder / name)
+        daemon.stop()
+    with TemporaryDirectory() as data, chromium() as browser:
+        daemon = Daemon(Path(data), "paper-table", keys=True)
+        admin = {"Authorization": f"Bearer {daemon.key('admin')}"}
+        daemon.start()
+        with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60, headers=admin) as api:
+            for name, state in GUARDED.items():
+                _take(browser, daemon, api, state, folder / name)
         daemon.stop()
 
 
@@ -110,25 +131,22 @@ def _calibrate(api: httpx.Client) -> None:
         events.read()
 
 
-def _take(
-    browser: Browser, daemon: Daemon, api: httpx.Client, state: State, file: Path, width: int, scheme: str
-) -> None:
-    if not daemon.running:
-        daemon.start()
-    api.post("/stop/acknowledge")
-    context = browser.new_context(
-        viewport={"width": width, "height": HEIGHT}, color_scheme="dark" if scheme == "dark" else "light"
-    )
-    page = context.new_page()
-    try:
+def _take(browser: Browser, daemon: Daemon, api: httpx.Client, state: State, file: Path) -> None:
+    """Take pictures of a state, from its beginning each time."""
+    for width, scheme in itertools.product(WIDTHS, SCHEMES):
+        if not daemon.running:
+            daemon.start()
+        lease = api.post("/lease", json={"owner": "nobody yet", "take_over": True}).json()
+        api.delete("/lease", headers={"X-Lease": lease["token"]})
+        api.post("/stop/acknowledge")
+        context = browser.new_context(viewport={"width": width, "height": HEIGHT}, color_scheme=scheme)
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE)
         state(page, daemon, api)
-        page.screenshot(path=file)
-    finally:
+        page.screenshot(path=f"{file}-{width}-{scheme}.png")
         context.close()
-        if daemon.running:
-            lease = api.post("/lease", json={"owner": "the next picture", "take_over": True}).json()
-            api.delete("/lease", headers={"X-Lease": lease["token"]})
-    sys.stdout.write(f"{file}\n")
+        sys.stdout.write(f"{file}-{width}-{scheme}.png\n")
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":
