@@ -30,7 +30,7 @@ async def _serve(address: str) -> asyncio.Server:
     where = urlsplit(address)
 
     async def pass_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with contextlib.suppress(asyncio.IncompleteReadError, OSError):
+        with contextlib.suppress(asyncio.IncompleteReadError, OSError), contextlib.closing(writer):
             head = await reader.readuntil(b"\r\n\r\n")
             method, path, rest = head.split(b" ", 2)
             if not path.startswith(PATH + b"/"):
@@ -42,7 +42,6 @@ async def _serve(address: str) -> asyncio.Server:
                 near.write(b" ".join([method, path.removeprefix(PATH), rest]))
                 with contextlib.closing(near):
                     await asyncio.gather(_copy(reader, near), _copy(far, writer))
-        writer.close()
 
     return await asyncio.start_server(pass_on, "127.0.0.1", 0)
 
@@ -60,3 +59,4 @@ async def _end(server: asyncio.Server) -> None:
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
+    await asyncio.sleep(0)  # in which what they have closed is
