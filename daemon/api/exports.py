@@ -42,7 +42,9 @@ class ExportDocument(BaseModel):
     name: str = Field(examples=["rig.urdf"])
     media_type: str = Field(examples=["application/xml"])
     purpose: str = Field(description="What it is and what for.")
-    size: int | None = Field(description="In bytes; null where it is known once it has been made.")
+    size: int | None = Field(
+        description="In bytes, of `session.zip` before packing; null where it is known once it has been made."
+    )
     notes: list[str] = Field(description="What it cannot say of the calibration, in sentences.")
     problem: str | None = Field(description="Why it cannot be had of this calibration.")
 

@@ -10,6 +10,7 @@ from daemon.export.session_archive import archive_of
 from daemon.export.subject import Subject
 from daemon.export.urdf import urdf, urdf_notes
 from daemon.export.yaml_lens import camera_info, lens_notes, opencv_lens
+from daemon.session_files import session_files
 
 Content = bytes | Iterator[bytes]
 """A file, or its pieces one after another."""
@@ -28,7 +29,7 @@ class Export:
     looks: bool = False
     """Whether it is made sooner where the subject knows what every point is off by."""
     size: Callable[[Subject, str | None], int | None] | None = None
-    """How large it is, None where that takes making it; raises as `make` does. None to make it and see."""
+    """How large it is, about, None where that takes making it; raises as `make` does. Else it is made."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,9 @@ class Offer:
     problem: str | None
 
 
-def _session_size(subject: Subject, _: str | None) -> None:
-    subject.session_folder()
+def _session_size(subject: Subject, _: str | None) -> int:
+    """Return the size of the session's files: packing makes hardly less of pictures."""
+    return sum(path.stat().st_size for path in session_files(subject.session_folder()))
 
 
 def _report_size(_: Subject, __: str | None) -> None:

@@ -3,4 +3,5 @@ export const sections = [
   { id: "rig", title: "Rig", load: () => import("./rig.js") },
   { id: "calibrate", title: "Calibrate", load: () => import("./calibrate.js") },
   { id: "history", title: "History", load: () => import("./history.js") },
+  { id: "takeaway", title: "Take away", load: () => import("./takeaway.js") },
 ];

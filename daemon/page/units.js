@@ -50,6 +50,13 @@ export function duration(seconds) {
   return minutes ? `${minutes} min ${whole % 60} s` : `${whole} s`;
 }
 
+/** Return how large a file is. */
+export function bytes(size) {
+  const units = ["B", "kB", "MB", "GB"];
+  const step = Math.min(units.length - 1, Math.floor(Math.log10(Math.max(size, 1)) / 3));
+  return quantity(size / 1000 ** step, units[step], step ? 1 : 0);
+}
+
 /** Return the time of day of an RFC 3339 time, here. */
 export function clock(time) {
   return new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });

@@ -19,7 +19,7 @@ class Daemon:
 
     def __init__(self, folder: Path, profile: str | None = None, *, keys: bool = False) -> None:
         self._profile = profile or str(write_profile(folder, time_scale=1.0, velocity=20.0))
-        self._data = folder / "data"
+        self.data = folder / "data"
         self._keys = keys
         self._port = 0
         self._process: subprocess.Popen[str] | None = None
@@ -27,7 +27,7 @@ class Daemon:
 
     def start(self) -> None:
         """Serve, at the address of before if there was one, and return when requests are answered."""
-        command = [*ACTIVECAM, "serve", "--profile", self._profile, "--data", str(self._data)]
+        command = [*ACTIVECAM, "serve", "--profile", self._profile, "--data", str(self.data)]
         command += ["--port", str(self._port), *(["--keys"] if self._keys else [])]
         self._process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
@@ -56,7 +56,7 @@ class Daemon:
 
     def key(self, role: str) -> str:
         """Return a new key of `role`."""
-        command = [*ACTIVECAM, "key", "add", role, "--role", role, "--data", str(self._data)]
+        command = [*ACTIVECAM, "key", "add", role, "--role", role, "--data", str(self.data)]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
     def forget_key(self, name: str) -> None:

@@ -70,6 +70,11 @@ def history(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     expect(page.get_by_role("table")).to_be_visible()
 
 
+def takeaway(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    page.goto(f"{daemon.address}#/takeaway")
+    expect(page.get_by_role("link", name="rig.urdf")).to_be_visible()
+
+
 def gone(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     ready(page, daemon, api)
     daemon.kill()
@@ -98,6 +103,7 @@ STATES: Final[dict[str, State]] = {
     "rig-held": held_by_another,
     "rig-stopped": stopped,
     "history": history,
+    "takeaway": takeaway,
     "gone": gone,
 }
 GUARDED: Final[dict[str, State]] = {"key": asked_for_a_key, "viewer": seen_by_a_viewer}

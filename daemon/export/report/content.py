@@ -135,6 +135,12 @@ def _figures(quality: Quality) -> Iterator[tuple[str, str]]:
     for name, value, what in pixels:
         if value is not None:
             yield name, f"{figure(value)} px {what}"
+    if quality.held_out_position_m is not None and quality.held_out_rotation_rad is not None:
+        position, rotation = (
+            figure(quality.held_out_position_m, 1e3),
+            figure(quality.held_out_rotation_rad, 1e3),
+        )
+        yield "Held-out poses", f"{position} mm and {rotation} mrad on the mean"
     for name, spread, unit in (
         ("Position known to", quality.position_std_m, "mm"),
         ("Rotation known to", quality.rotation_std_rad, "mrad"),
@@ -182,7 +188,7 @@ def _verification(subject: Subject, session: Session | None) -> Verification | N
 def _predicted(verification: Verification | None, calibration: Calibration) -> Iterator[Block]:
     if verification is None:
         alone = calibration.quality.held_out_by == "leave_one_view_out"
-        others = "; each was predicted by the fit of all others, as the first figure shows" if alone else ""
+        others = "; each was predicted by the fit of all others, as the list of views says" if alone else ""
         yield Words(f"No views were held out{others}.")
         return
     kinds = list(dict.fromkeys(travel.kind for travel in verification.travel if travel.rows))
@@ -205,6 +211,8 @@ def _residuals(subject: Subject, session: Session) -> Iterator[Block]:
     except CalibError as error:
         yield Words(f"Residuals by direction and by place are left out: {error}.")
         return
+    if not seen:
+        yield Words("Its views carried poses, and no points: the list of views says how far each is off.")
     unused = {view.view for view in calibration.quality.views if view.set_aside or view.use == "none"}
     for index, camera in enumerate(session.cameras):
         own = [
