@@ -1,9 +1,8 @@
 """Plates of all five kinds as the simulated drivers render them, with the truth about every point."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -71,13 +70,13 @@ class SeenPlate:
         self.target, self.scene = target, scene
         self._width, self._height = scene.width, scene.width * 3 // 4
         focal = FOCAL * scene.width
-        self._centre = (self._width / 2 - 0.37, self._height / 2 - 0.81)
-        self._lens = Lens("opencv", focal, focal, *self._centre, DISTORTION)
+        centre = (self._width / 2 - 0.37, self._height / 2 - 0.81)
+        self._lens = Lens("opencv", focal, focal, *centre, DISTORTION)
         self._plate = Plate(parse_target(target.model_dump(exclude={"pitch_std"})), PlateOptions())
         self._camera_from_world = self._pose(focal)
         options = PictureOptions(
             noise=scene.noise,
-            defocus="0 px",
+            defocus=f"{scene.blur} px",
             light_gradient=scene.gradient,
             brightness=BRIGHTEST / PlateOptions().paper / (1 + scene.gradient),
         )
@@ -86,15 +85,9 @@ class SeenPlate:
     def light(self, shift: tuple[float, float] = (0.0, 0.0)) -> Grey:
         """Return the picture free of noise, all of it shifted (px) but for the light's gradient."""
         finer = 1 if self.scene.width > RENDERED_FINE else FINER
-        centre = (np.array(self._centre) + shift + 0.5) * finer - 0.5
-        focal = FOCAL * self.scene.width * finer
-        lens = Lens("opencv", focal, focal, *centre, DISTORTION)
-        renderer = Renderer(self._plate, lens, finer * self._width, finer * self._height)
-        fine = renderer.render(np.linalg.inv(self._camera_from_world))
-        # Defocus comes before the pixels: what is finer than they are must be gone when they add up the light.
-        fine = cv2.GaussianBlur(fine, (0, 0), finer * self.scene.blur)
-        light = cv2.resize(fine, (self._width, self._height), interpolation=cv2.INTER_AREA)
-        return self._sensor.gather(np.asarray(light, np.float32))
+        shifted = replace(self._lens, cx=self._lens.cx + shift[0], cy=self._lens.cy + shift[1])
+        renderer = Renderer(self._plate, shifted.finer(finer), finer * self._width, finer * self._height)
+        return self._sensor.gather(renderer.render(np.linalg.inv(self._camera_from_world)))
 
     def picture(self, light: Grey, noise: np.random.Generator) -> NDArray[np.uint8]:
         """Return one picture of the light, with its own noise."""

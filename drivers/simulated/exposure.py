@@ -17,6 +17,8 @@ _VISIBLE = 0.02
 _STEP = 0.5
 """Pixels between two instants of a blurred picture, as far as `_INSTANTS` allows: each costs a rendering."""
 _INSTANTS = 8
+_FINER = 2
+"""Times by which light that a lens blurs is finer than the pixels: edges are off by 0.002 px, and by 0.014 px at 1."""
 
 
 class Exposure:
@@ -26,8 +28,10 @@ class Exposure:
         """`instants`: of how many a blurred picture is made at most."""
         self._world = world
         self._instants = instants
-        self._renderer = Renderer(world.plate, world.lens, width, height)
-        self._sensor = Sensor(world.options.camera.picture, width, height)
+        picture = world.options.camera.picture
+        finer = _FINER if picture.defocus > 0.0 else 1
+        self._renderer = Renderer(world.plate, world.lens.finer(finer), finer * width, finer * height)
+        self._sensor = Sensor(picture, width, height)
         self._still: tuple[bytes, Grey] | None = None
 
     def prepare(self) -> None:

@@ -3,7 +3,7 @@
 Coordinates are normalised: x = X/Z, y = Y/Z in the camera's frame. Suffix u: without distortion, d: with it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -36,6 +36,11 @@ class Lens:
     def from_options(cls, options: LensOptions) -> "Lens":
         """Make the lens that the profile describes."""
         return cls(options.model, options.fx, options.fy, options.cx, options.cy, options.distortion)
+
+    def finer(self, times: int) -> "Lens":
+        """Return the same lens before pixels that are so many times finer and share the picture's outline."""
+        cx, cy = ((centre + 0.5) * times - 0.5 for centre in (self.cx, self.cy))
+        return replace(self, fx=times * self.fx, fy=times * self.fy, cx=cx, cy=cy)
 
     def project(self, points: ArrayLike) -> Array:
         """Return the pixels (n, 2) of points (n, 3) in the camera's frame; nan where no ray goes there."""
@@ -135,8 +140,8 @@ def ray_field(lens: Lens, width: int, height: int) -> RayField:
     rays = lens.directions(nodes).reshape(_NODES, _NODES, 2)
     if not np.all(np.isfinite(rays)):
         raise OptionsError(
-            f"the simulated lens cannot see all of a {width} x {height} picture: "
-            "its distortion folds over inside; make the distortion weaker or the focal length longer"
+            "the simulated lens cannot see all of its picture: its distortion folds over inside; "
+            "make the distortion weaker or the focal length longer"
         )
     field = [(down @ rays[:, :, i] @ across.T).astype(np.float32) for i in (0, 1)]
     for array in field:

@@ -14,16 +14,23 @@ Grey = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Sensor:
-    """The sensor behind one lens; light is float32 grey levels (height, width)."""
+    """The sensor behind one lens; light is float32 grey levels (height, width), or finer."""
 
     options: PictureOptions
     width: int
     height: int
 
     def gather(self, light: Grey) -> Grey:
-        """Return the light that arrives through a lens that is out of focus and lit unevenly."""
+        """Return the light on each pixel that arrives through a lens that is out of focus and lit unevenly.
+
+        The light given may be a whole number of times finer than the pixels, and is to be for edges to lie where
+        they are: a lens blurs light before pixels add it up, and what they have added up no blur mends.
+        """
+        finer = light.shape[0] // self.height
         if self.options.defocus > 0.0:
-            light = np.asarray(cv2.GaussianBlur(light, (0, 0), self.options.defocus), np.float32)
+            light = np.asarray(cv2.GaussianBlur(light, (0, 0), finer * self.options.defocus), np.float32)
+        if finer > 1:
+            light = np.asarray(cv2.resize(light, (self.width, self.height), interpolation=cv2.INTER_AREA))
         return light * self._gain
 
     def read(self, light: Grey, noise: np.random.Generator) -> NDArray[np.uint8]:

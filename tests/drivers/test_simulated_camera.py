@@ -175,7 +175,7 @@ async def test_options_that_do_not_fit_are_refused_with_the_reason() -> None:
         SimulatedCamera.create(
             CameraSpec("main", 640, 480), SimulatedCamera.Options(), DriverContext(VirtualClock())
         )
-    with pytest.raises(OptionsError, match=r"cannot see all of a 640 x 480 picture"):
+    with pytest.raises(OptionsError, match=r"cannot see all of its picture"):
         await opened(world(lens=SMALL["lens"] | {"fx": "200 px", "fy": "200 px", "distortion": [-0.3]}))
     with pytest.raises(ValueError, match=r"longer than the time between frames"):
         world(picture={"exposure": "50 ms", "frame_rate": "30 Hz"})

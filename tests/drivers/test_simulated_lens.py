@@ -53,5 +53,5 @@ def test_the_far_field_is_not_folded_into_the_picture() -> None:
 
 
 def test_a_lens_that_cannot_fill_the_picture_is_refused() -> None:
-    with pytest.raises(OptionsError, match="cannot see all of a 1280 x 960 picture"):
+    with pytest.raises(OptionsError, match="cannot see all of its picture"):
         ray_field(Lens("opencv", 400.0, 400.0, 640.0, 480.0, (-0.3,)), 1280, 960)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
+from scipy.special import ndtr
 
+from drivers.simulated.exposure import Exposure
 from drivers.simulated.options import PictureOptions
 from drivers.simulated.renderer import Renderer
 from drivers.simulated.sensor import Sensor
@@ -126,6 +128,37 @@ def test_every_pixel_has_its_share_of_ink(view: str) -> None:
     error = np.abs((PAPER - image[v, u]) / (PAPER - INK) - share)
     assert error.max() < 0.08  # in the one pixel that has the corner in it
     assert error.mean() < 0.005
+
+
+@pytest.mark.parametrize("blur", [0.5, 1.0])
+@pytest.mark.parametrize("view", VIEWS)
+def test_light_is_blurred_before_pixels_add_it_up(view: str, blur: float) -> None:
+    world = rigs.still_world("chessboard", picture={"noise": 0.0, "defocus": f"{blur} px"}, **VIEWS[view])
+    pose = world.world_from_camera([])
+    taken = Exposure(world, rigs.WIDTH, rigs.HEIGHT).picture([pose], np.random.default_rng(1))
+    # Edges along y, half way from corner to corner, where they are straight and nothing else is near.
+    middles = world.target_points()[:-9] + np.array([0, 0.0125, 0])
+    places, left, below = (
+        geometry.project(middles + step, pose) for step in ([0, 0, 0], [-0.005, 0, 0], [0, 0.001, 0])
+    )
+    along = (below - places) / np.linalg.norm(below - places, axis=1)[:, None]
+    normals = np.column_stack([along[:, 1], -along[:, 0]])
+    normals *= np.sign(((places - left) * normals).sum(axis=1))[:, None]  # from the square before to the next
+    black_before = np.add(*np.divmod(np.arange(len(middles)), 9)) % 2 == 1
+    seen = inside(places, 20)
+    offsets = np.arange(-3, 4)
+    around = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
+    pixels = np.rint(places[seen])[:, None] + around
+    square = (np.arange(16) + 0.5) / 16 - 0.5
+    within = np.stack(np.meshgrid(square, square), axis=-1).reshape(-1, 2)
+    beyond = np.einsum("npsc,nc->nps", pixels[:, :, None] + within - places[seen, None, None], normals[seen])
+    after = ndtr(beyond / blur).mean(axis=2)
+    expected = np.where(black_before[seen, None], 1 - after, after)
+    u, v = np.moveaxis(pixels.astype(int), -1, 0)
+    errors = np.abs((PAPER - taken[v, u].astype(float)) / (PAPER - INK) - expected)
+    assert seen.sum() >= 40
+    assert errors.mean() < 0.003
+    assert errors.max() < 0.02
 
 
 def test_a_bulging_plate_is_seen_where_its_points_are() -> None:

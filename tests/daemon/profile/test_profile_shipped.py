@@ -1,15 +1,23 @@
 """The shipped rigs: every picture of their procedures shows the whole target, large enough to measure."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from calib.detection import detect
 from daemon.profile import PlannedView, Profile, load_profile, shipped_profiles
 from drivers.clock import SystemClock
 from drivers.simulated import SimulatedWorld
+from drivers.simulated.exposure import Exposure
 
 MARGIN = 15.0
 """Pixels around the paper: rigs of the simulation hit their targets to much less than one."""
+APART = 5
+"""Views from one that is rendered to the next."""
+DISKS = "paper-table"
+"""Whose points are no corners: what is seen of a disk's centre is not the centre's own picture."""
 SPACING = 15.0
 """Pixels between neighbouring points, below which detectors become unsure."""
 
@@ -73,6 +81,23 @@ def test_the_target_is_tilted_enough_to_tell_focal_length_from_distance(
     ]
     assert np.median(tilts) > 20
     assert max(tilts) < 60
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_profiles() if name != DISKS])
+def test_corners_in_the_pictures_lie_where_they_are_and_are_as_sure_as_is_claimed(name: str) -> None:
+    profile = load_profile(name)
+    world, camera = _world(profile), profile.camera.spec
+    exposure, noise = Exposure(world, camera.width, camera.height), np.random.default_rng(7)
+    misses, claims = [], []
+    for view in islice(profile.procedure.planned_views(), None, None, APART):
+        pose = world.world_from_camera(_readings(view))
+        found = detect(exposure.picture([pose], noise), profile.target)
+        misses.append(found.pixels - world.project_from(world.target_points(), pose)[found.ids])
+        claims.append(found.covariances)
+    miss, claim = np.concatenate(misses), np.concatenate(claims)
+    assert np.sqrt(np.square(miss).sum(axis=1).mean()) < 0.007
+    weighed = np.linalg.solve(claim, miss[..., None])[..., 0]
+    assert 0.5 < (miss * weighed).sum(axis=1).mean() / 2 < 1.3
 
 
 def test_each_joint_is_exercised_alone_by_at_least_nine_positions(profile: Profile) -> None:
