@@ -34,12 +34,9 @@ POSITION, ROTATION = 3e-4, 5e-4
 # larger ones smaller, but of a larger board; axes are faster and stand sooner; some views are left out.
 PATIENT = ("[procedure]", '[procedure]\nframe_timeout = "60 s"')
 FEWER_PICTURES = ('frame_rate = "10 Hz"', 'frame_rate = "5 Hz"')
-# The table's target is one of disks here: what ChArUco boards on it claim was exceeded in one run of several.
 CHANGES = {
     "grbl-table": (
         PATIENT,
-        ('kind = "charuco"\nrows = 6\ncolumns = 8\n', 'kind = "circle_grid"\nrows = 6\ncolumns = 7\n'),
-        ('marker = "23 mm"\ndictionary = "DICT_5X5_100"\n', 'disk_diameter = "18 mm"\n'),
         FEWER_PICTURES,
         ('velocity = "60 mm/s"', 'velocity = "300 mm/s"'),
         ('acceleration = "400 mm/s2"', 'acceleration = "3000 mm/s2"'),
@@ -71,8 +68,11 @@ CHANGES = {
         ('["-7.7 deg", "-4.1 deg", "-0.5 deg", "3.1 deg", "6.7 deg"]', '["-4.1 deg", "3.1 deg"]'),
     ),
 }
-LATENCY: Final = ('latency = "2 s"', 'latency = "1.5 s"')
-"""Of the emulated cameras: each view waits for all of it, and pictures that come later end the run."""
+LATENCY: Final = ('latency = "2 s"', 'latency = "1.5 s"\ntimeout = "60 s"')
+"""Of the emulated cameras: each view waits for all of it, and pictures that come later end the run.
+
+A machine that is too busy to render any is no lost camera.
+"""
 
 
 @dataclass(frozen=True)
