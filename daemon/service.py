@@ -89,7 +89,7 @@ class Service:
         self.streams.close()
         # Before the latch, which would fail the run rather than interrupt it.
         await self.runs.close()
-        self.rig.latch.engage("the daemon is shutting down")
+        self.rig.latch.engage("the daemon is shutting down", for_good=True)
         await self.motions.close()
         self.leases.close()
 

@@ -93,7 +93,7 @@ class Rig:
 
     async def close(self) -> None:
         """Stop all axes, wait until they stand, and let the devices go, even while being cancelled."""
-        self.latch.engage("the daemon is shutting down")
+        self.latch.engage("the daemon is shutting down", for_good=True)
         await finish(self._close())
 
     def age(self, snapshot: RigSnapshot) -> float | None:

@@ -12,6 +12,7 @@ class StopLatch:
     def __init__(self) -> None:
         self.reason: str | None = None
         self.since: datetime | None = None
+        self._for_good = False
         self._listeners: list[Callable[[str], None]] = []
 
     @property
@@ -23,16 +24,21 @@ class StopLatch:
         """Call `listener` with the reason of each stop."""
         self._listeners.append(listener)
 
-    def engage(self, reason: str) -> None:
-        """Refuse all motion from now on; the first reason stays until it is acknowledged."""
+    def engage(self, reason: str, *, for_good: bool = False) -> None:
+        """Refuse all motion from now on; the first reason stays until it is acknowledged, if it can be.
+
+        `for_good` is whether nobody can: who acknowledges a stop while the daemon shuts down sets nothing in motion.
+        """
+        self._for_good = self._for_good or for_good
         if self.reason is None:
             self.reason, self.since = reason, datetime.now(UTC)
         for listener in self._listeners:
             listener(reason)
 
     def acknowledge(self) -> None:
-        """Allow motion again."""
-        self.reason = self.since = None
+        """Allow motion again, unless it is refused for good."""
+        if not self._for_good:
+            self.reason = self.since = None
 
     def require_free(self) -> None:
         """Raise StopLatchedError while engaged."""

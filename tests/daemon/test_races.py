@@ -1,0 +1,70 @@
+"""What may come at the same moment, and is to end as if one had come after the other."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from daemon.profile import Profile
+from daemon.service import Service, running_service
+from daemon.store import CalibrationRecord, RunRecord, RunState
+from tests.daemon.motions import home_all
+from tests.daemon.snapshots import VERSIONS, restore_snapshot
+
+EARLIER = "1087d24108964e429a2ba048f07a4efa"
+"""A calibration of the snapshot, of the rig of these tests."""
+
+
+@pytest.mark.parametrize("first", ["a person", "the run"])
+async def test_a_person_and_a_run_activate_at_once(
+    profile: Profile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first: str
+) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    restore_snapshot(VERSIONS[-1], data)
+    async with running_service(profile, data) as service:
+        store, asked = service.store, asyncio.Event()
+        activate, change_run, persons = store.activate, store.change_run, []
+
+        async def told(calibration_id: str) -> CalibrationRecord:
+            asked.set()
+            return await activate(calibration_id)
+
+        async def at_once(run_id: str, state: RunState, *more: Any, **keyed: Any) -> RunRecord:
+            if keyed.get("calibration") is None:
+                return await change_run(run_id, state, *more, **keyed)
+            persons.append(asyncio.create_task(service.activate(EARLIER)))
+            if first == "a person":
+                await asked.wait()
+            return await change_run(run_id, state, *more, **keyed)
+
+        monkeypatch.setattr(store, "activate", told)
+        monkeypatch.setattr(store, "change_run", at_once)
+        run = await service.runs.wait((await service.runs.start()).id)
+        await asyncio.gather(*persons)
+        assert len(persons) == 1
+        assert run.state is RunState.SUCCEEDED
+        used = service.poses.calibration_id
+        assert used == (await store.active_and_earlier())[0]
+        assert used == (run.calibration_id if first == "a person" else EARLIER)
+
+
+async def test_who_acknowledges_a_stop_while_the_daemon_ends_moves_nothing(
+    service: Service, client: httpx.AsyncClient
+) -> None:
+    await home_all(service.rig)
+    lease = service.leases.acquire("anna", "", 60.0)
+    await service.motions.begin(lease, ["slide"], service.rig.move({"slide": 90.0}))
+    engaged = asyncio.Event()
+    service.rig.latch.on_engage(lambda _: engaged.set())
+    ending = asyncio.create_task(service.halt())
+    await engaged.wait()
+    assert not ending.done()
+    assert (await client.post("/stop/acknowledge")).json()["latched"]
+    await ending
+    token = (await client.post("/lease", json={"owner": "bert", "note": "", "ttl_s": 60})).json()["token"]
+    refused = await client.post("/axes/slide/jog", json={"distance": 1.0}, headers={"X-Lease": token})
+    assert refused.json()["code"] == "stop_latched"
+    assert not service.rig.snapshot.moving
