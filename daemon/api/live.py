@@ -5,7 +5,7 @@ import contextlib
 from collections.abc import AsyncIterator
 from typing import Any, Final, Literal
 
-from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, WebSocket
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 
@@ -90,11 +90,10 @@ class Client:
 
     async def obey(self) -> None:
         """Begin each command as it comes, whatever the ones before it do, until the client has gone."""
-        with contextlib.suppress(WebSocketDisconnect):
-            while True:
-                task = asyncio.create_task(self._carry_out(await self._socket.receive_text()))
-                self._commands.add(task)
-                task.add_done_callback(self._commands.discard)
+        while (message := await self._socket.receive())["type"] != "websocket.disconnect":
+            task = asyncio.create_task(self._carry_out(message.get("text") or message.get("bytes") or b""))
+            self._commands.add(task)
+            task.add_done_callback(self._commands.discard)
 
     async def leave(self) -> None:
         """Give the lease back; also one that was asked for when the client went."""
@@ -102,11 +101,11 @@ class Client:
         await asyncio.gather(*self._commands, return_exceptions=True)
         self._release()
 
-    async def _carry_out(self, text: str) -> None:
+    async def _carry_out(self, text: str | bytes) -> None:
         answer = await self._answer(text)
         self._answered.put_nowait(to_json({"type": "answer"} | answer).decode())
 
-    async def _answer(self, text: str) -> dict[str, Any]:
+    async def _answer(self, text: str | bytes) -> dict[str, Any]:
         try:
             command = Command.model_validate_json(text)
         except ValidationError as error:

@@ -204,6 +204,7 @@ async def _answer_invalid(request: Request, error: Exception) -> Response:
 def invalid(errors: Sequence[Mapping[str, Any]], instance: str) -> dict[str, Any]:
     """Return the problem document on what pydantic finds wrong with a message."""
     wrong = [_invalid_field(error) for error in errors]
+    wrong = [{**each, "field": each["field"] or "message"} for each in wrong]
     return document(INVALID, _in_words(wrong), instance) | {"errors": wrong}
 
 

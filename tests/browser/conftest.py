@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from benchmarks.chromium import CHROMIUM, chromium
 from tests.browser.daemons import Daemon
@@ -15,8 +15,9 @@ from tests.browser.daemons import Daemon
 AXE_VERSION = "4.14.1"
 CACHE = Path(__file__).parents[2] / ".npm-for-tests"
 """Where npm puts what the tests need of it."""
-PATIENCE = 20_000
+PATIENCE = 60_000
 """Milliseconds that a busy machine may take to show something."""
+expect.set_options(timeout=PATIENCE)
 
 
 def missing(what: str) -> None:

@@ -78,7 +78,7 @@ def takeaway(page: Page, daemon: Daemon, api: httpx.Client) -> None:
 def gone(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     ready(page, daemon, api)
     daemon.kill()
-    expect(page.get_by_text("The daemon does not answer")).to_be_visible()
+    expect(page.get_by_role("alert")).to_contain_text("The daemon does not answer")
 
 
 def asked_for_a_key(page: Page, daemon: Daemon, api: httpx.Client) -> None:

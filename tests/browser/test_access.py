@@ -7,7 +7,6 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.daemons import Daemon
 
-expect.set_options(timeout=20_000)
 Open = Callable[..., Page]
 
 

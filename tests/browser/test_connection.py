@@ -7,7 +7,6 @@ from playwright.sync_api import Page, Request, expect
 from tests.browser.daemons import Daemon
 from tests.browser.proxy import proxied
 
-expect.set_options(timeout=20_000)
 Open = Callable[..., Page]
 
 

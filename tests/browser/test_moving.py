@@ -10,7 +10,6 @@ from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.daemons import Daemon
 
-expect.set_options(timeout=20_000)
 Open = Callable[..., Page]
 
 
@@ -55,6 +54,24 @@ def test_the_picture_is_live_and_the_target_is_drawn_on_it(daemon: Daemon, open_
     expect(page.locator(".rate")).to_contain_text("pictures/s")
     page.get_by_label("Target", exact=True).uncheck()
     expect(page.locator("canvas").first).to_have_attribute("data-points", "0")
+
+
+def test_readings_are_shown_in_mm_and_degrees(daemon: Daemon, open_page: Open) -> None:
+    page = open_page(daemon.address)
+    shown = page.evaluate("""async () => {
+      const { measureOf, quantity, reading } = await import(new URL("page/units.js", document.baseURI));
+      const axis = (kind, unit, tolerance) => ({ kind, unit, tolerance });
+      return [
+        reading(-0.5, axis("revolute", "rad", 0.001)),
+        reading(1.25, axis("prismatic", "m", 0.0001)),
+        reading(-0.001, axis("revolute", "deg", 0.05)),
+        reading(-81920, axis("revolute", "counts", 4)),
+        reading(null, axis("prismatic", "mm", 0.05)),
+        quantity(3.14159, "px", 1),
+        measureOf(axis("prismatic", "deg", 1)).unit,
+      ];
+    }""")
+    assert shown == ["−28.65°", "1250.0\xa0mm", "0.00°", "−81920\xa0counts", "–", "3.1\xa0px", "deg"]
 
 
 def test_home_jog_and_go_to(daemon: Daemon, open_page: Open) -> None:

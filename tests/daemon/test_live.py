@@ -132,7 +132,9 @@ async def test_a_lease_ends_with_its_socket_and_so_do_its_motions(service: Servi
 async def test_what_is_no_command_is_refused_in_words(live: str) -> None:
     async with connect(live) as socket:
         for text, said in (
-            ("no JSON", "Invalid JSON"),
+            ("no JSON", "message: Invalid JSON"),
+            (b"\xff", "Invalid JSON"),
+            ("[]", "message: Input should be an object"),
             ('{"id": 1, "do": "dance"}', "'stop'"),
             ('{"do": "stop"}', "id"),
         ):
