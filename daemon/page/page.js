@@ -85,6 +85,7 @@ export class Page {
       return true;
     } catch (error) {
       if (error.name === "AbortError") return false;
+      if (error.code === "unreachable" && !this.live.connected) return false; // which the banner says
       this.tell(error.message, "problem");
       if (!(error instanceof Problem)) throw error;
       return false;
