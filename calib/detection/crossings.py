@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -32,6 +32,10 @@ class Crossings:
     bends: Floats
     lengths: Floats
     clear: Floats
+
+    def part(self, chosen: slice) -> Crossings:
+        """Return the chosen ones."""
+        return Crossings(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def heights(self, x: Singles, y: Singles) -> tuple[Singles, Singles]:
         """Tell how far (n, m) to the right of the one edge and of the other places (n, m) are, px from the corners."""

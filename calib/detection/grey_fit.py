@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,10 @@ class Light:
         off = float(np.sqrt(np.square(levels[good, None] - light.at(pixels[good])).mean()))
         return cls(np.concatenate(slopes, axis=1), max(off / apart, LEAST_SLOPE))
 
+    def part(self, chosen: slice) -> Light:
+        """Return it on the chosen pieces."""
+        return Light(self.slopes[chosen], self.std)
+
 
 @dataclass(frozen=True, eq=False)
 class GreyFit:
@@ -60,6 +64,11 @@ class GreyFit:
     steps: Floats
     scatters: Floats
     converged: NDArray[np.bool_]
+
+    @classmethod
+    def joined(cls, fits: Sequence[GreyFit]) -> GreyFit:
+        """Put the fits of some pieces after those of others."""
+        return cls(*(np.concatenate([getattr(fit, field.name) for fit in fits]) for field in fields(cls)))
 
 
 def fit_grey_values(
