@@ -110,17 +110,24 @@ def _bends(at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give by how much (..., 2, 5) each of a lens' coefficients moves places (..., 2): Brown's, as in `BentView`."""
     x, y = at[..., 0], at[..., 1]
     squares = x * x + y * y
-    along_x = [x * squares, x * squares**2, x * squares**3, 2 * x * y, squares + 2 * x * x]
-    along_y = [y * squares, y * squares**2, y * squares**3, squares + 2 * y * y, 2 * x * y]
-    return np.stack([np.stack(along_x, axis=-1), np.stack(along_y, axis=-1)], axis=-2)
+    bends = np.empty((*at.shape, 5))
+    np.multiply(at, squares[..., None], out=bends[..., 0])
+    np.multiply(bends[..., 0], squares[..., None], out=bends[..., 1])
+    np.multiply(bends[..., 1], squares[..., None], out=bends[..., 2])
+    bends[..., 0, 3] = bends[..., 1, 4] = 2 * x * y
+    bends[..., 0, 4] = squares + 2 * x * x
+    bends[..., 1, 3] = squares + 2 * y * y
+    return bends
 
 
 def _small_changes(at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give by how much (n, 2, 8) the entries of a homography near to identity, but the last, move places (n, 2)."""
-    here = np.column_stack([at, np.ones(len(at))])
-    nothing = np.zeros_like(here)
-    rows = np.stack([np.hstack([here, nothing]), np.hstack([nothing, here])], axis=1)
-    return np.concatenate([rows, -at[:, :, None] * at[:, None]], axis=-1)
+    changes = np.zeros((len(at), 2, 8))
+    for axis, first in enumerate((0, 3)):
+        changes[:, axis, first : first + 2] = at
+        changes[:, axis, first + 2] = 1
+    np.multiply(-at[:, :, None], at[:, None], out=changes[:, :, 6:])
+    return changes
 
 
 def span_a_plane(points: NDArray[np.float64]) -> bool:

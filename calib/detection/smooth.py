@@ -44,10 +44,11 @@ def _count(degree: int) -> int:
 
 def _terms(at: Floats, count: int) -> Floats:
     """Give so many powers x^i y^j (..., count) of places (..., 2): all up to a degree."""
-    x, y = at[..., 0], at[..., 1]
-    highest = [np.ones(x.shape)]
-    terms = highest[:count]
-    while len(terms) < count:
-        highest = [*(x * term for term in highest), y * highest[-1]]
-        terms += highest
-    return np.stack(terms, axis=-1) if terms else np.empty((*x.shape, 0))
+    terms = np.ones((*at.shape[:-1], count))
+    first, degree = 0, 0
+    while first + degree + 1 < count:
+        highest, first = terms[..., first : first + degree + 1], first + degree + 1
+        degree += 1
+        np.multiply(at[..., :1], highest, out=terms[..., first : first + degree])
+        np.multiply(at[..., 1], highest[..., -1], out=terms[..., first + degree])
+    return terms
