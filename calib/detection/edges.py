@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, hypot, pi, sqrt
+from math import atan2, hypot, isqrt, pi, sqrt
 
 import cv2
 import numpy as np
@@ -19,7 +19,10 @@ LEAST_STEP = 0.5  # of the region's contrast: ink against paper, and not a shado
 CLEAR_OF_NOISE = 8.0  # times the noise: a step of less tells nothing of its width
 BOX_FROM_WIDTH = sqrt(12) / 2.563  # a Gaussian's edge is 2.563 deviations wide, a box has length / sqrt(12)
 
+ENOUGH = 100_000  # pixels, to tell a percentile by
+
 Array = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,21 @@ class Edges:
     smear_px: float
 
 
+def sample_of(
+    values: NDArray[np.uint8 | np.uint16], region: NDArray[np.bool_] | None
+) -> NDArray[np.uint8 | np.uint16]:
+    """Take grey `values` (h, w), or those of a `region` (h, w), from here and there: enough to tell percentiles by."""
+    count = values.size if region is None else np.count_nonzero(region)
+    apart = 1 + isqrt(count // ENOUGH)
+    some = values[::apart, ::apart]
+    return some.ravel() if region is None else some[region[::apart, ::apart]]
+
+
 def measure_edges(
-    values: NDArray[np.float32], noise: float, region: NDArray[np.bool_] | None = None, reach: float = REACH
+    values: NDArray[np.uint8 | np.uint16],
+    noise: float,
+    region: NDArray[np.bool_] | None = None,
+    reach: float = REACH,
 ) -> Edges | None:
     """Measure the edges of grey `values` (h, w), or of a `region` (h, w) of them; None where there are too few.
 
@@ -53,12 +69,12 @@ def measure_edges(
         beyond = int(np.ceil(reach)) + 1
         window = tuple(slice(max(at[0] - beyond, 0), at[-1] + beyond + 1) for at in (rows, columns))
         values, region = values[window], region[window]
-    part = values if region is None else values[region]
-    dark, bright = np.percentile(part.ravel()[:: 1 + part.size // 100_000], (1, 99))
+    dark, bright = np.percentile(sample_of(values, region), (1, 99))
     step = LEAST_STEP * float(bright - dark)
     if step < CLEAR_OF_NOISE * noise:
         return None
-    smooth = cv2.GaussianBlur(values, (0, 0), 1.0)
+    singles = values.astype(np.float32)
+    smooth = cv2.GaussianBlur(singles, (0, 0), 1.0)
     along_x, along_y = (cv2.Scharr(smooth, cv2.CV_32F, *order, scale=1 / 32) for order in ((1, 0), (0, 1)))
     steep = np.asarray(cv2.magnitude(along_x, along_y))
     # Flat enough to catch the widest edge that can be told; which of them are edges the profiles say.
@@ -69,7 +85,7 @@ def measure_edges(
     chosen = places[np.linspace(0, len(places) - 1, min(len(places), MOST_EDGES)).astype(int)]
     y, x = np.divmod(chosen, values.shape[1])
     normals = np.column_stack([along_x[y, x], along_y[y, x]]).astype(np.float64) / steep[y, x, None]
-    widths = _widths(values, np.column_stack([x, y]), normals, reach, step)
+    widths = _widths(singles, np.column_stack([x, y]), normals, reach, step)
     known = np.isfinite(widths)
     if known.sum() < FEWEST_EDGES:
         return None
@@ -84,15 +100,15 @@ def _widths(
     NaN where the step is smaller than `step`, or the place is not amid it.
     """
     half = round(reach / STEP)
-    along = STEP * np.arange(-half, half + 1)
-    tangents = normals[:, ::-1] * [-1, 1]
+    along = (STEP * np.arange(-half, half + 1)).astype(np.float32)
     # Three profiles side by side: half the noise, for no blur that counts.
-    samples = (
-        places[:, None, None]
-        + along[None, None, :, None] * normals[:, None, None]
-        + np.array([-1.0, 0.0, 1.0])[None, :, None, None] * tangents[:, None, None]
+    aside = np.array([[-1.0], [0.0], [1.0]], dtype=np.float32)
+    x, y = places.astype(np.float32).T[:, :, None, None]
+    normal_x, normal_y = normals.astype(np.float32).T[:, :, None, None]
+    samples = _sampled(
+        values, x + along * normal_x - aside * normal_y, y + along * normal_y + aside * normal_x
     )
-    profiles = _sampled(values, samples).mean(axis=1)
+    profiles = samples.mean(axis=1, dtype=np.float64)
     before, after = profiles[:, half::-1], profiles[:, half:]
     dark, bright = before.min(axis=1), after.max(axis=1)
     rise = np.maximum(bright - dark, 1e-9)
@@ -102,18 +118,20 @@ def _widths(
     return np.where((rise >= step) & (abs(middle - 0.5) < 0.25), STEP * width, np.nan)
 
 
-def _sampled(values: NDArray[np.float32], pixels: Array) -> Array:
-    """Interpolate `values` (h, w) at `pixels` (..., 2), the border's beyond it: as cv2.remap, of any size."""
-    last = np.array(values.shape[::-1]) - 1
-    inside = np.clip(pixels, 0, last)
-    corner = np.minimum(inside.astype(np.int64), last - 1)
-    right, down = np.moveaxis(inside - corner, -1, 0)
-    first = corner[..., 1] * values.shape[1] + corner[..., 0]
-    flat = values.ravel()
-    above = flat[first] * (1 - right) + flat[first + 1] * right
-    first += values.shape[1]
-    below = flat[first] * (1 - right) + flat[first + 1] * right
-    return np.asarray(above * (1 - down) + below * down)
+def _sampled(values: NDArray[np.float32], x: Singles, y: Singles) -> Singles:
+    """Interpolate `values` (h, w) at `x` and `y` (...), the border's beyond it: as cv2.remap, of any size."""
+    height, width = values.shape
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+    column, row = np.minimum(x.astype(np.intp), width - 2), np.minimum(y.astype(np.intp), height - 2)
+    right, down = x - column.astype(np.float32), y - row.astype(np.float32)
+    first = row * width + column
+    above = _between(values.take(first), values.take(first + 1), right)
+    first += width
+    return _between(above, _between(values.take(first), values.take(first + 1), right), down)
+
+
+def _between(first: Singles, last: Singles, part: Singles) -> Singles:
+    return first + part * (last - first)
 
 
 def _first_beyond(profiles: Array, level: float) -> Array:

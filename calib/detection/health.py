@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.detection import Detection
-from calib.detection.edges import REACH, Edges, measure_edges
-from calib.detection.picture import grey_values, noise_of
+from calib.detection.edges import REACH, Edges, measure_edges, sample_of
+from calib.detection.picture import grey_values, noise_of, samples_apart
 from calib.detection.plane import PlaneView, view_of_plane
 from calib.targets import (
     AprilGrid,
@@ -28,7 +28,6 @@ SATURATED = 0.995  # of the full scale
 FULL_SCALES = (1023, 4095, 16383, 65535)
 CELL = 16  # px at least: the picture is looked over for saturated patches in cells of this size
 MOST_CELLS = 40  # a side of the picture
-ENOUGH = 100_000  # pixels, to tell a percentile by
 SATURATED_CELL = 0.25  # of its pixels
 
 Array = NDArray[np.float64]
@@ -104,7 +103,7 @@ def picture_health(
     """
     values = grey_values(image)
     height, width = values.shape
-    noise = noise_of(values)
+    noise = noise_of(values, samples_apart(values))
     full = 255 if values.dtype == np.uint8 else next(scale for scale in FULL_SCALES if values.max() <= scale)
     seen, region, reach = None, None, REACH
     if detection is not None and len(detection.ids):
@@ -117,7 +116,7 @@ def picture_health(
         width=width,
         height=height,
         exposure=_exposure(values, noise, full, saturated, region),
-        edges=measure_edges(values.astype(np.float32), noise, region, reach),
+        edges=measure_edges(values, noise, region, reach),
         glare=_glare(saturated, region),
         target=seen,
     )
@@ -132,9 +131,12 @@ def _exposure(
 ) -> Exposure:
     # A target that was not found may be a small part of the picture.
     rest = 0.1 if region is None else 2.0
-    part = values.ravel() if region is None else values[region]
-    ink, paper = np.percentile(part[:: 1 + part.size // ENOUGH], (rest, 100 - rest)) / full
-    share = saturated.mean() if region is None else saturated[region].mean()
+    ink, paper = np.percentile(sample_of(values, region), (rest, 100 - rest)) / full
+    share = (
+        saturated.mean()
+        if region is None
+        else np.count_nonzero(saturated & region) / np.count_nonzero(region)
+    )
     return Exposure(float(ink), float(paper), noise / full, float(share))
 
 

@@ -54,8 +54,13 @@ def read_picture(image: NDArray[np.generic]) -> Picture:
     Raises DetectionError where it is no such picture, or one in which nothing can be seen.
     """
     values = grey_values(image)
-    apart = max(round(sqrt(values.size / SAMPLES)), 1)
+    apart = samples_apart(values)
     return Picture(_stretched(values, apart), values, noise_of(values, apart))
+
+
+def samples_apart(values: NDArray[np.generic]) -> int:
+    """Say how many px apart pixels are that tell enough of the light and the noise."""
+    return max(round(sqrt(values.size / SAMPLES)), 1)
 
 
 def grey_values(
@@ -133,7 +138,7 @@ def _stretched(values: NDArray[np.uint8 | np.uint16], apart: int) -> NDArray[np.
     return np.asarray(stretched, dtype=np.uint8)
 
 
-def noise_of(values: NDArray[np.uint8 | np.uint16], apart: int = 3) -> float:
+def noise_of(values: NDArray[np.uint8 | np.uint16], apart: int) -> float:
     """Estimate the standard deviation of the grey values' noise, at least that of rounding to whole numbers.
 
     From the median response to a mask that is blind to planes and edges (Immerkær, Fast noise variance
