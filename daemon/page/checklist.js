@@ -1,6 +1,7 @@
 /** The checklist: what stands for and against a run, and beside each thing what mends it. */
 
 import { fill, h, setText } from "./elements.js";
+import { sentenceOf } from "./units.js";
 
 const MARKS = { true: ["✓", "ok"], false: ["✗", "not ok"], null: ["?", "not known"] };
 
@@ -55,7 +56,7 @@ class Item {
     this.element.dataset.ok = ok;
     setText(this.#mark, mark);
     setText(this.#word, `: ${word}`);
-    setText(this.#message, sentence(message));
+    setText(this.#message, sentenceOf(message));
     if (this.#mend !== null) this.#mend.hidden = ok === true;
   }
 }
@@ -104,8 +105,4 @@ async function homeAll(page, button) {
   } finally {
     button.removeAttribute("aria-busy");
   }
-}
-
-function sentence(message) {
-  return `${message[0].toUpperCase()}${message.slice(1)}.`;
 }

@@ -5,7 +5,7 @@ import { mountChecklist } from "./checklist.js";
 import { fill, h, setText } from "./elements.js";
 import { mountPicture } from "./picture.js";
 import { mountPlan } from "./plan.js";
-import { duration, moment } from "./units.js";
+import { duration, moment, sentenceOf } from "./units.js";
 
 /** Fill `element`; `signal` is aborted when a run begins. */
 export function mountPreparation(element, page, signal) {
@@ -77,7 +77,7 @@ async function tellUnfinished(element, page, signal) {
   fill(
     element,
     h("h2", { id: "unfinished-title" }, "The last run was cut off"),
-    h("p", {}, `${moment(last.created_at)}: ${last.error ?? last.state}`),
+    h("p", {}, `${moment(last.created_at)}. ${sentenceOf(last.error ?? last.state)}`),
     h("p", {}, h("a", { href: `#/calibrate/${last.id}` }, "Take it up again, or solve it as it is")),
   );
 }

@@ -4,7 +4,7 @@ import { address } from "./api.js";
 import { fill, h, setText } from "./elements.js";
 import { USES } from "./plan.js";
 import { Progress } from "./progress.js";
-import { clock, duration } from "./units.js";
+import { clock, duration, sentenceOf } from "./units.js";
 import { mountViews } from "./view_wall.js";
 
 /** Fill `element` with the run `id`. */
@@ -16,7 +16,7 @@ export async function mountRun(element, page, signal, id) {
   if (signal.aborted) return;
 
   const panel = (name) => h("section", { class: `panel ${name}`, "aria-labelledby": `${name}-title` });
-  const [result, advance, warnings, views] = ["result", "advance", "warnings", "views"].map(panel);
+  const [result, advance, warnings, views] = ["result", "advance", "warnings", "taken"].map(panel);
   fill(element, result, advance, warnings, views);
   const parts = [
     mountResult(result, page, run),
@@ -207,7 +207,7 @@ function unfinished(page, run, { end, quality }) {
   const words = { failed: "The run failed", cancelled: "The run was cancelled", interrupted: "The run was interrupted" };
   return [
     h("h2", { id: "result-title" }, words[end.state]),
-    h("p", { role: "status" }, `${end.error ?? end.state}.`),
+    h("p", { role: "status" }, sentenceOf(end.error ?? end.state)),
     solved && h("p", { class: "verdict", "data-judgement": quality?.judgement }, said(quality)),
     h("p", { class: "hint" }, "Taken up again, it homes all axes and goes on with the first sweep that is not finished. Its views can be solved as far as they go."),
     toMove !== null && h("p", { class: "reason" }, toMove),
@@ -216,7 +216,7 @@ function unfinished(page, run, { end, quality }) {
 }
 
 function said(quality) {
-  return quality?.verdict ? `${quality.verdict}.` : "What it has measured is solved.";
+  return quality?.verdict ? sentenceOf(quality.verdict) : "What it has measured is solved.";
 }
 
 function judgeLink(calibrationId) {

@@ -72,7 +72,7 @@ class Pen {
       const [x, y] = this.#view.at(point);
       this.#context.fillRect(x - 1, y - 1, 2, 2);
     }
-    this.#label("target", outline[3], text);
+    this.#label("target", outline[3], text, 16);
   }
 
   frame(pose, name, width) {
@@ -82,7 +82,7 @@ class Pen {
       const way = pose.slice(0, 3).map((row) => row[i]);
       this.#line([at, plus(at, times(way, FRAME * this.#view.size))], colour, width);
     });
-    if (name !== null) this.#label(name, at, muted);
+    if (name !== null) this.#label(name, at, muted, 16);
   }
 
   /** A screw: a straight axis is an arrow, a turning one has a ring around it that points the way of growing readings. */
@@ -102,7 +102,7 @@ class Pen {
     } else {
       this.#tip(end, axis, text);
     }
-    this.#label(name, end, text, true);
+    this.#label(name, end, text);
   }
 
   camera({ name, pose, corners }) {
@@ -118,7 +118,7 @@ class Pen {
     this.#context.beginPath();
     this.#context.arc(x, y, 4, 0, 2 * Math.PI);
     this.#context.fill();
-    this.#label(name, eye, accent, true);
+    this.#label(name, eye, accent);
   }
 
   /** One standard deviation, enlarged: its outline, and its three sections. */
@@ -145,16 +145,15 @@ class Pen {
     this.#path([[x - dx - dy / 2, y - dy + dx / 2], [x, y], [x - dx + dy / 2, y - dy - dx / 2]], colour, 1.5);
   }
 
-  #label(text, point, colour, haloed = false) {
+  /** Write a name beside a point, above it or below. */
+  #label(text, point, colour, lower = -6) {
     const context = this.#context;
-    const [x, y] = this.#view.at(point);
-    if (haloed) {
-      context.strokeStyle = this.#colours.surface;
-      context.lineWidth = 4;
-      context.strokeText(text, x + 8, y - 6);
-    }
+    const [x, y] = plus(this.#view.at(point), [8, lower]);
+    context.strokeStyle = this.#colours.surface;
+    context.lineWidth = 4;
+    context.strokeText(text, x, y);
     context.fillStyle = colour;
-    context.fillText(text, x + 8, y - 6);
+    context.fillText(text, x, y);
   }
 
   #line(points, colour, width, style) {

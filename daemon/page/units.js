@@ -67,3 +67,8 @@ export function moment(time) {
   const options = { year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit" };
   return new Date(time).toLocaleString([], options);
 }
+
+/** Return a message of the daemon, which begins small and has no full stop, as a sentence by itself. */
+export function sentenceOf(message) {
+  return `${message[0].toUpperCase()}${message.slice(1)}.`;
+}

@@ -17,7 +17,7 @@ export function mountViews(element, page, signal, runId) {
   const empty = h("p", { class: "empty" }, "The first view comes when the axes have reached its position.");
   const enlarged = h("figure", { class: "enlarged", tabindex: "-1", hidden: true, "aria-label": "Enlarged view" });
   const count = h("p", { class: "hint" });
-  const head = h("div", { class: "panel-head" }, h("h2", { id: "views-title" }, "Views"), count);
+  const head = h("div", { class: "panel-head" }, h("h2", { id: "taken-title" }, "Views"), count);
   fill(element, head, enlarged, empty, list);
   const base = `runs/${encodeURIComponent(runId)}/views`;
   const views = new Map();
@@ -63,7 +63,7 @@ export function mountViews(element, page, signal, runId) {
 
   function tally() {
     empty.hidden = views.size > 0;
-    setText(count, views.size ? `${views.size} so far, the newest first. ← → go from one to the next, Enter enlarges.` : "");
+    setText(count, views.size ? `${views.size}, the newest first. ← → go from one to the next, Enter enlarges.` : "");
     if (list.contains(document.activeElement)) return;
     list.querySelectorAll("button").forEach((button, i) => (button.tabIndex = i ? -1 : 0));
   }
@@ -180,7 +180,7 @@ class Card {
   #place() {
     const { joint, readings } = this.view;
     const axes = this.#axes();
-    const at = (axis, i) => `${axis.name} ${reading(readings[i], axis)}`;
+    const at = (axis, i) => `${axis.name}\u00a0${reading(readings[i], axis)}`;
     const all = axes.map(at);
     return joint === null || !axes.length ? all.join(", ") : all[axes.findIndex(({ name }) => name === joint)] ?? "";
   }

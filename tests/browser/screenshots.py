@@ -1,16 +1,19 @@
 """Pictures of the page in each of its states: `python -m tests.browser.screenshots FOLDER`, or `make screenshots`.
 
+With `STATE ...` after the folder only those are taken.
+
 Each is taken at the width of a desk and of a tablet, in light and in dark, for whoever changes the page to look at.
 """
 
 import itertools
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Literal
 
 import httpx
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 from benchmarks.chromium import chromium
@@ -65,6 +68,37 @@ def stopped(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     expect(page.get_by_role("button", name="Acknowledge")).to_be_visible()
 
 
+def prepared(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    page.goto(f"{daemon.address}#/calibrate/new")
+    expect(page.locator(".checks li").first).to_be_visible()
+    expect(page.locator(".chart").first).to_be_visible()
+    expect(page.locator(".rate")).to_contain_text("pictures/s")
+
+
+def calibrated(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    page.goto(f"{daemon.address}#/calibrate")
+    expect(page.locator(".result .verdict")).to_be_visible()
+    expect(page.locator(".residual").last).to_contain_text("px")
+    page.wait_for_load_state("networkidle")
+
+
+def calibrating(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    api.post("/runs", json={"owner": "anna", "note": "after the move to room 2"}).raise_for_status()
+    page.goto(f"{daemon.address}#/calibrate")
+    expect(page.locator(".wall li").nth(17)).to_be_visible()
+    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_text("Paused: all axes stand")).to_be_visible()
+    expect(page.locator(".residual").first).to_contain_text("px")
+    page.wait_for_load_state("networkidle")
+
+
+def cut_off(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    page.goto(f"{daemon.address}#/calibrate")
+    expect(page.get_by_role("button", name="Take it up again")).to_be_visible()
+    expect(page.locator(".residual").first).to_contain_text("px")
+    page.wait_for_load_state("networkidle")
+
+
 def history(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     page.goto(f"{daemon.address}#/history")
     expect(page.get_by_role("table")).to_be_visible()
@@ -102,6 +136,10 @@ STATES: Final[dict[str, State]] = {
     "rig-coverage": covered,
     "rig-held": held_by_another,
     "rig-stopped": stopped,
+    "calibrate": prepared,
+    "calibrated": calibrated,
+    "calibrating": calibrating,
+    "calibrating-cut-off": cut_off,
     "history": history,
     "takeaway": takeaway,
     "gone": gone,
@@ -109,16 +147,24 @@ STATES: Final[dict[str, State]] = {
 GUARDED: Final[dict[str, State]] = {"key": asked_for_a_key, "viewer": seen_by_a_viewer}
 """Where keys are asked for."""
 
+DOCUMENTED: Final = ("rig-homed", "calibrate", "calibrating", "calibrated")
+"""Those that the documentation shows."""
+DOCUMENTATION: Final = Path(__file__).parents[2] / "docs" / "screenshots"
+SHOWN: Final = 1080
+"""Their width there (px)."""
+STEPS: Final = 5
+"""To how many levels of 255 their colours are rounded: a camera's noise takes most of the bytes, and shows nothing."""
 
-def main(folder: Path) -> None:
-    """Take all of them into `folder`."""
+
+def main(folder: Path, wanted: Collection[str]) -> None:
+    """Take them into `folder`, and give the documentation its own."""
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as data, chromium() as browser:
         daemon = Daemon(Path(data), "paper-table")
         daemon.start()
         with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60) as api:
             _calibrate(api)
-            for name, state in STATES.items():
+            for name, state in _chosen(STATES, wanted):
                 _take(browser, daemon, api, state, folder / name)
         daemon.stop()
     with TemporaryDirectory() as data, chromium() as browser:
@@ -126,9 +172,28 @@ def main(folder: Path) -> None:
         admin = {"Authorization": f"Bearer {daemon.key('admin')}"}
         daemon.start()
         with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60, headers=admin) as api:
-            for name, state in GUARDED.items():
+            for name, state in _chosen(GUARDED, wanted):
                 _take(browser, daemon, api, state, folder / name)
         daemon.stop()
+    DOCUMENTATION.mkdir(exist_ok=True)
+    for name in DOCUMENTED:
+        picture = folder / f"{name}-{WIDTHS[0]}-light.png"
+        if picture.exists():
+            _shrink(picture, DOCUMENTATION / f"{name}.png")
+
+
+def _chosen(states: dict[str, State], wanted: Collection[str]) -> list[tuple[str, State]]:
+    """Return those of the states that are wanted: all, where none is named."""
+    return [(name, state) for name, state in states.items() if not wanted or name in wanted]
+
+
+def _shrink(picture: Path, to: Path) -> None:
+    """Write a picture smaller."""
+    with Image.open(picture) as opened:
+        smaller = opened.convert("RGB")
+    smaller.thumbnail((SHOWN, SHOWN))
+    rounded = smaller.point([round(level / STEPS) * STEPS for level in range(256)] * 3)
+    rounded.quantize(256, dither=Image.Dither.NONE).save(to, optimize=True)
 
 
 def _calibrate(api: httpx.Client) -> None:
@@ -142,6 +207,9 @@ def _take(browser: Browser, daemon: Daemon, api: httpx.Client, state: State, fil
     for width, scheme in itertools.product(WIDTHS, SCHEMES):
         if not daemon.running:
             daemon.start()
+        run = api.get("/rig").json()["run"]
+        if run is not None:
+            api.post(f"/runs/{run}/cancel").raise_for_status()
         lease = api.post("/lease", json={"owner": "nobody yet", "take_over": True}).json()
         api.delete("/lease", headers={"X-Lease": lease["token"]})
         api.post("/stop/acknowledge")
@@ -156,4 +224,4 @@ def _take(browser: Browser, daemon: Daemon, api: httpx.Client, state: State, fil
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2:])
