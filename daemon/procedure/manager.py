@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 
 from calib import Calibration
@@ -11,11 +11,11 @@ from daemon.errors import RigFaultError, RunActiveError, RunStateError, StoreErr
 from daemon.lease import Lease, LeaseDesk
 from daemon.procedure.assignment import Assignment, Calibrate, Solve
 from daemon.procedure.beginning import new_record, require_same_profile
-from daemon.procedure.event_log import EventLog, Told, past_events
-from daemon.procedure.events import RunEvent
+from daemon.procedure.event_log import EventLog, Told
 from daemon.procedure.measured import require_views
 from daemon.procedure.plan import starts_here
 from daemon.procedure.run import Run
+from daemon.procedure.run_book import RunBook
 from daemon.rig import Rig
 from daemon.store import CalibrationRecord, RunRecord, RunState, Store
 
@@ -24,8 +24,8 @@ logger = logging.getLogger(__name__)
 Activate = Callable[[CalibrationRecord, Calibration], None]
 
 
-class RunManager:
-    """Starts and steers runs, and knows those of the past.
+class RunManager(RunBook):
+    """Starts and steers runs.
 
     `activate` is called with the calibration of a run that has succeeded, before its last event is told; `told`
     with every event.
@@ -34,28 +34,16 @@ class RunManager:
     def __init__(
         self, rig: Rig, leases: LeaseDesk, store: Store, activate: Activate, told: Told | None = None
     ) -> None:
+        super().__init__(store)
         self._rig = rig
         self._leases = leases
-        self._store = store
         self._activate = activate
         self._told = told
-        self._latest: Run | None = None
         self._starting = asyncio.Lock()
         self._closed = False
         self._stops = 0
         """How many times everything was stopped."""
         rig.latch.on_engage(self._stop)
-
-    @property
-    def active(self) -> Run | None:
-        """The run under way, if any."""
-        latest = self._latest
-        return None if latest is None or latest.record.state.over else latest
-
-    @property
-    def latest(self) -> Run | None:
-        """The run under way, or the last one since the daemon began."""
-        return self._latest
 
     async def start(
         self, owner: str = "", note: str = "", token: str | None = None, from_here: Sequence[str] = ()
@@ -133,44 +121,6 @@ class RunManager:
         run = self._require_active(run_id)
         await run.end(RunState.CANCELLED, "it was cancelled")
         return run.record
-
-    async def wait(self, run_id: str) -> RunRecord:
-        """Return the run when it is over; raises UnknownRunError."""
-        async for _ in self.events(run_id):
-            pass
-        return await self.get(run_id)
-
-    async def get(self, run_id: str) -> RunRecord:
-        """Return one run; raises UnknownRunError."""
-        if self._latest is not None and self._latest.record.id == run_id:
-            return self._latest.record
-        return await self._store.run(run_id)
-
-    async def told(self, run_id: str) -> Sequence[RunEvent]:
-        """Return a run's events so far; raises UnknownRunError."""
-        if self._latest is not None and self._latest.record.id == run_id:
-            return self._latest.log.events
-        record = await self._store.run(run_id)
-        return await asyncio.to_thread(past_events, record, self._store.session_folder(record))
-
-    async def list(self) -> Sequence[RunRecord]:
-        """Return all runs, the newest first."""
-        # The store may not have taken the latest's end, which only its own record tells then.
-        latest = None if self._latest is None else self._latest.record
-        return [latest if latest and latest.id == run.id else run for run in await self._store.runs()]
-
-    async def events(self, run_id: str, after: int = 0) -> AsyncIterator[RunEvent]:
-        """Yield a run's events whose sequence is greater than `after`, and follow it to its end.
-
-        Raises UnknownRunError.
-        """
-        if self._latest is not None and self._latest.record.id == run_id:
-            async for event in self._latest.log.follow(after):
-                yield event
-            return
-        for event in await self.told(run_id):
-            if event.sequence > after:
-                yield event
 
     async def close(self) -> None:
         """Start no more runs, interrupt the one under way, if any, and return when its axes stand."""

@@ -15,6 +15,7 @@ from daemon.errors import TargetUnseenError
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Homing, JointStarted, Moving, Planned, Use, ViewTaken, Warned
 from daemon.procedure.observation import Observation, Observer, Taken, find, find_where_predicted
+from daemon.procedure.remarks import Remarks, Spot
 from daemon.profile import FreeView, Sweep
 from daemon.rig import Rig
 from drivers.cancellation import finish
@@ -46,7 +47,7 @@ class Survey:
         self._position = 0
         self._resumed = bool(writer.session.views or writer.session.set_aside)
         self._forgotten = bool(writer.session.views)  # what an earlier part of the run saw
-        self._told: set[str] = set()  # the kinds of faults that were told of in this sweep
+        self._remarks = Remarks(log, self._positions)
         self._seen: list[ViewObservation] = []
         self._unseen: list[_Unseen] = []
 
@@ -82,7 +83,7 @@ class Survey:
     async def _sweep(self, sweep: Sweep) -> None:
         await self._checkpoint()
         self._log.add(JointStarted(joint=sweep.joint, views=len(sweep.readings), use=sweep.use))
-        self._told.clear()
+        self._remarks.begin_sweep()
         await self._observer.go(sweep.start)
         seen = 0
         for reading in sweep.readings:
@@ -97,7 +98,7 @@ class Survey:
     async def _free_views(self, views: tuple[FreeView, ...]) -> None:
         await self._checkpoint()
         self._log.add(JointStarted(joint=None, views=len(views)))
-        self._told.clear()
+        self._remarks.begin_sweep()
         for view in views:
             await self._view(view.readings, None, view.use)
         await self._look_again()
@@ -108,7 +109,7 @@ class Survey:
         self._position += 1
         self._log.add(Moving(position=self._position, of=self._positions, targets=dict(targets)))
         await self._observer.go(targets)
-        spot = _Spot(self._position, joint, use)
+        spot = Spot(self._position, joint, use)
         for first in (True, False):
             taken = await self._observer.take()
             try:
@@ -118,7 +119,7 @@ class Survey:
                     self._unseen.append(_Unseen(spot, taken, str(error)))
             else:
                 await self._store(observation, spot)
-                self._warn(observation, spot)
+                self._remarks.warn(observation, spot)
                 return True
         if len(self._unseen) > MOST_KEPT:
             self._leave_out(self._unseen.pop(0))
@@ -143,33 +144,17 @@ class Survey:
                     continue
                 self._unseen.remove(unseen)
                 await self._store(observation, unseen.spot)
-                self._tell(unseen.spot, partly_seen(observation.seen.detection, session.target))
-                self._warn(observation, unseen.spot)
+                self._remarks.tell(unseen.spot, partly_seen(observation.seen.detection, session.target))
+                self._remarks.warn(observation, unseen.spot)
                 count, found = count + 1, True
         while self._unseen:
             self._leave_out(self._unseen.pop(0))
         return count
 
     def _leave_out(self, unseen: "_Unseen") -> None:
-        self._log.add(Warned(message=f"{self._where(unseen.spot)} is left out: {unseen.problem}"))
+        self._remarks.leave_out(unseen.spot, unseen.problem)
 
-    def _warn(self, observation: Observation, spot: "_Spot") -> None:
-        """Tell of pictures that are worse than they should be, of each kind of fault once a sweep."""
-        found: dict[str, str] = {fault.kind: fault.message for fault in observation.faults if fault.spoils}
-        if observation.seen.warning is not None:
-            found["frames"] = observation.seen.warning
-        for kind, message in found.items():
-            if kind not in self._told:
-                self._told.add(kind)
-                self._tell(spot, message)
-
-    def _tell(self, spot: "_Spot", message: str) -> None:
-        self._log.add(Warned(message=f"{self._where(spot)} is measured all the same: {message}"))
-
-    def _where(self, spot: "_Spot") -> str:
-        return f"position {spot.position} of {self._positions}"
-
-    async def _store(self, observation: Observation, spot: "_Spot") -> None:
+    async def _store(self, observation: Observation, spot: Spot) -> None:
         taken, detection = observation.taken, observation.seen.detection
         fields: dict[str, Any] = {
             "joint": spot.joint,
@@ -199,19 +184,10 @@ class Survey:
 
 
 @dataclass(frozen=True, slots=True)
-class _Spot:
-    """A position of the plan, which counts them from 1, and what its view is for."""
-
-    position: int
-    joint: str | None
-    use: Use
-
-
-@dataclass(frozen=True, slots=True)
 class _Unseen:
     """Frames in which the target was not found, and why."""
 
-    spot: _Spot
+    spot: Spot
     taken: Taken
     problem: str
 
