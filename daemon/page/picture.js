@@ -199,23 +199,25 @@ class Health {
 
   follow(detection) {
     const { found, faults, problem, ids, health } = detection;
-    const kind = [found, ...faults.map((fault) => fault.kind)].join(" ");
-    const of = health?.target?.of;
-    const seen = of && of > ids.length ? `${ids.length} of ${of} points of the target are seen` : "The target is seen";
+    const of = health?.target?.of ?? ids.length;
+    const seen = of > ids.length ? "A part of the target is seen" : "The target is seen";
     const verdict = faults.length ? `${seen}, with a reservation.` : `${seen}, and the picture is good to measure in.`;
+    const text = found ? verdict : (problem ?? "The target is not seen.");
+    const kind = [found ? seen : "", ...faults.map((fault) => fault.kind)].join(" ");
     const now = performance.now();
     if (kind !== this.#coming) [this.#coming, this.#since] = [kind, now];
     const isNews = kind !== this.#said && (this.#said === null || now - this.#since > SETTLED);
     if (!isNews && (kind !== this.#said || now - this.#refreshed < SETTLED)) return;
     this.#refreshed = now;
-    const text = found ? verdict : (problem ?? "The target is not seen.");
-    this.say(kind, isNews ? text : this.#words.textContent, faults.map((fault) => fault.message));
+    const part = found && of > ids.length ? [`${ids.length} of its ${of} points are found.`] : [];
+    const details = [...part, ...faults.map((fault) => fault.message)];
+    this.say(kind, isNews ? text : this.#words.textContent, details, found && !faults.length);
   }
 
-  say(kind, text, details) {
+  say(kind, text, details, isGood = false) {
     if (kind !== this.#said) this.#words.dispatchEvent(new Event("health", { bubbles: true }));
     this.#said = kind;
-    this.#words.dataset.kind = kind === "true" ? "good" : "poor";
+    this.#words.dataset.kind = isGood ? "good" : "poor";
     setText(this.#words, text);
     fill(this.#details, ...details.map((each) => h("li", {}, each)));
   }
