@@ -4,6 +4,7 @@
  */
 
 import { within } from "./again.js";
+import { Problem } from "./api.js";
 import { fill, h } from "./elements.js";
 import { mountPreparation } from "./preparation.js";
 import { mountRun } from "./run.js";
@@ -26,6 +27,12 @@ export function mount(element, page, { signal, path }) {
     inner = within(signal);
     fill(element);
     if (id === NEW) mountPreparation(element, page, inner.signal);
-    else mountRun(element, page, inner.signal, id);
+    else mountRun(element, page, inner.signal, id).catch(tell);
   }, signal);
+
+  function tell(error) {
+    if (error.name === "AbortError") return;
+    fill(element, h("p", { class: "problem", role: "alert" }, error.message));
+    if (!(error instanceof Problem)) throw error;
+  }
 }
