@@ -2,6 +2,6 @@
 export const sections = [
   { id: "rig", title: "Rig", load: () => import("./rig.js") },
   { id: "calibrate", title: "Calibrate", load: () => import("./calibrate.js") },
-  { id: "history", title: "History", load: () => import("./history.js") },
+  { id: "judge", title: "Judge", load: () => import("./judge.js") },
   { id: "takeaway", title: "Take away", load: () => import("./takeaway.js") },
 ];

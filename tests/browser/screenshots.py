@@ -6,6 +6,7 @@ Each is taken at the width of a desk and of a tablet, in light and in dark, for 
 """
 
 import itertools
+import re
 import sys
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -99,9 +100,39 @@ def cut_off(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     page.wait_for_load_state("networkidle")
 
 
-def history(page: Page, daemon: Daemon, api: httpx.Client) -> None:
-    page.goto(f"{daemon.address}#/history")
-    expect(page.get_by_role("table")).to_be_visible()
+def judged(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    page.goto(f"{daemon.address}#/judge")
+    expect(page.get_by_role("img", name=re.compile("Residuals by direction"))).to_be_visible(timeout=120_000)
+    expect(page.get_by_role("img", name=re.compile("Picture of view"))).to_be_visible()
+
+
+def judged_by_views(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    judged(page, daemon, api)
+    page.get_by_label(re.compile("Drop view")).first.check()
+    _scroll_to(page, "Views")
+
+
+def judged_by_residuals(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    judged(page, daemon, api)
+    _scroll_to(page, "Residuals")
+
+
+def beside_another(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    entries = api.get("/calibrations").json()
+    if len(entries) < 2:
+        _follow(api, api.post(f"/runs/{entries[0]['run_id']}/solve", json={"leave_out": [21]}).json()["id"])
+        entries = api.get("/calibrations").json()
+    page.goto(f"{daemon.address}#/judge/{entries[0]['id']}/{entries[1]['id']}")
+    expect(page.get_by_text("What differs, in numbers")).to_be_visible()
+
+
+def _scroll_to(page: Page, heading: str) -> None:
+    header = page.locator("header").bounding_box()
+    panel = page.get_by_role("region", name=heading, exact=True).bounding_box()
+    assert header is not None
+    assert panel is not None
+    page.mouse.wheel(0, panel["y"] - header["height"] - 12)
+    page.wait_for_function("window.scrollY > 0")
 
 
 def takeaway(page: Page, daemon: Daemon, api: httpx.Client) -> None:
@@ -138,9 +169,12 @@ STATES: Final[dict[str, State]] = {
     "rig-stopped": stopped,
     "calibrate": prepared,
     "calibrated": calibrated,
+    "judge": judged,
+    "judge-views": judged_by_views,
+    "judge-residuals": judged_by_residuals,
+    "judge-beside": beside_another,
     "calibrating": calibrating,
     "calibrating-cut-off": cut_off,
-    "history": history,
     "takeaway": takeaway,
     "gone": gone,
 }
@@ -198,6 +232,10 @@ def _shrink(picture: Path, to: Path) -> None:
 
 def _calibrate(api: httpx.Client) -> None:
     run = api.post("/runs", json={"owner": "anna", "note": "after the move to room 2"}).json()["id"]
+    _follow(api, run)
+
+
+def _follow(api: httpx.Client, run: str) -> None:
     with api.stream("GET", f"/runs/{run}/events", timeout=600) as events:
         events.read()
 
