@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Self
+from typing import Any, Self
 
-from sqlalchemy import delete, select
-from sqlalchemy.orm import Session
+from sqlalchemy import Connection, Row, delete, insert, select, update
 
 from daemon.store.database import Database
-from daemon.store.tables import AnswerRow
+from daemon.store.tables import ANSWERS, fields_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,27 +44,22 @@ class StoredAnswers:
     async def read(self, since: datetime) -> Sequence[KeptRequest]:
         """Return the requests asked since then, the oldest first; those before are forgotten."""
 
-        def work(session: Session) -> list[KeptRequest]:
-            session.execute(delete(AnswerRow).where(AnswerRow.asked_at < since))
-            return [_request(row) for row in session.scalars(select(AnswerRow).order_by(AnswerRow.asked_at))]
+        def work(connection: Connection) -> list[KeptRequest]:
+            connection.execute(delete(ANSWERS).where(ANSWERS.c.asked_at < since))
+            oldest_first = select(ANSWERS).order_by(ANSWERS.c.asked_at)
+            return [_request(row) for row in connection.execute(oldest_first)]
 
         return await self._database.transact(work)
 
     async def add(self, request: KeptRequest, since: datetime) -> None:
         """Store a request that is about to be carried out; those asked before `since` are forgotten."""
 
-        def work(session: Session) -> None:
-            session.execute(delete(AnswerRow).where(AnswerRow.asked_at < since))
-            session.merge(
-                AnswerRow(
-                    key=request.key,
-                    fingerprint=request.fingerprint,
-                    asked_at=request.asked_at,
-                    status=None,
-                    media_type=None,
-                    body=None,
-                    location=None,
-                )
+        def work(connection: Connection) -> None:
+            connection.execute(delete(ANSWERS).where(ANSWERS.c.asked_at < since))
+            connection.execute(
+                insert(ANSWERS)
+                .prefix_with("OR REPLACE")
+                .values(key=request.key, fingerprint=request.fingerprint, asked_at=request.asked_at)
             )
 
         await self._database.transact(work)
@@ -73,16 +67,13 @@ class StoredAnswers:
     async def settle(self, key: str, answer: KeptAnswer) -> None:
         """Store what a request was answered."""
 
-        def work(session: Session) -> None:
-            row = session.get(AnswerRow, key)
-            if row is not None:
-                row.status, row.media_type = answer.status, answer.media_type
-                row.body, row.location = answer.body, answer.location
+        def work(connection: Connection) -> None:
+            connection.execute(update(ANSWERS).where(ANSWERS.c.key == key).values(fields_of(answer)))
 
         await self._database.transact(work)
 
 
-def _request(row: AnswerRow) -> KeptRequest:
+def _request(row: Row[Any]) -> KeptRequest:
     if row.status is None or row.media_type is None or row.body is None:
         return KeptRequest(row.key, row.fingerprint, row.asked_at)
     answer = KeptAnswer(row.status, row.media_type, row.body, row.location)

@@ -1,15 +1,14 @@
 """The audit log: the latest entries of what was done. Every method raises StoreError when the disk fails."""
 
 from collections.abc import Collection, Sequence
-from typing import Final
+from typing import Any, Final
 
-from sqlalchemy import delete, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import Connection, Row, delete, func, insert, select
 
 from daemon.access.entries import AuditEntry
 from daemon.access.roles import Role
 from daemon.store.database import Database
-from daemon.store.tables import AuditRow
+from daemon.store.tables import AUDIT, fields_of
 
 KEPT: Final = 100_000
 """Entries, some 20 MB; the oldest make room for new ones."""
@@ -25,31 +24,27 @@ class StoredAudit:
     async def write(self, entries: Collection[AuditEntry]) -> None:
         """Store new entries, which get their ids, and what has changed in others; drop the oldest."""
 
-        def work(session: Session) -> None:
-            rows = [(entry, session.merge(_row(entry))) for entry in entries]
-            session.flush()
-            newest = select(func.max(AuditRow.id)).scalar_subquery()
-            session.execute(delete(AuditRow).where(AuditRow.id <= newest - self._kept))
-            numbers.extend((entry, row.id) for entry, row in rows)
+        def work(connection: Connection) -> list[int]:
+            put = insert(AUDIT).prefix_with("OR REPLACE")
+            numbers = [connection.execute(put.values(fields_of(entry))).lastrowid for entry in entries]
+            newest = select(func.max(AUDIT.c.id)).scalar_subquery()
+            connection.execute(delete(AUDIT).where(AUDIT.c.id <= newest - self._kept))
+            return numbers
 
-        numbers: list[tuple[AuditEntry, int]] = []
         if entries:
-            await self._database.transact(work)
-        for entry, number in numbers:
-            entry.id = number
+            numbers = await self._database.transact(work)
+            for entry, number in zip(entries, numbers, strict=True):
+                entry.id = number
 
     async def read(self, before: int | None, limit: int) -> Sequence[AuditEntry]:
         """Return the newest `limit` entries, of those with ids below `before`, the newest first."""
-        newest = select(AuditRow).order_by(AuditRow.id.desc()).limit(limit)
+        newest = select(AUDIT).order_by(AUDIT.c.id.desc()).limit(limit)
         if before is not None:
-            newest = newest.where(AuditRow.id < before)
-        return await self._database.transact(lambda session: [_entry(row) for row in session.scalars(newest)])
+            newest = newest.where(AUDIT.c.id < before)
+        return await self._database.transact(
+            lambda connection: [_entry(row) for row in connection.execute(newest)]
+        )
 
 
-def _row(entry: AuditEntry) -> AuditRow:
-    return AuditRow(**{name: getattr(entry, name) for name in AuditEntry.__dataclass_fields__})
-
-
-def _entry(row: AuditRow) -> AuditEntry:
-    fields = {name: getattr(row, name) for name in AuditEntry.__dataclass_fields__}
-    return AuditEntry(**fields | {"role": Role(row.role)})
+def _entry(row: Row[Any]) -> AuditEntry:
+    return AuditEntry(**row._asdict() | {"role": Role(row.role)})

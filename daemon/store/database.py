@@ -10,13 +10,12 @@ from typing import IO, Any, Final, Self, TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import SQLAlchemyError
-from sqlalchemy.orm import Session
 
 from daemon.errors import FolderInUseError, StoreError
 from daemon.store.copies import copy_database
 from daemon.store.folder_lock import lock_folder
 from daemon.store.migrations import migrate, schema_version
-from daemon.store.tables import Table
+from daemon.store.tables import TABLES
 
 logger = logging.getLogger(__name__)
 
@@ -64,13 +63,13 @@ class Database:
         await self._in_thread(self._close)
         self._thread.shutdown()
 
-    async def transact(self, work: Callable[[Session], Result]) -> Result:
+    async def transact(self, work: Callable[[Connection], Result]) -> Result:
         """Run `work` in a transaction of its own, on disk when this returns; raises StoreError."""
 
         def transaction() -> Result:
-            # Records are made inside the transaction, so nothing needs the rows after it.
-            with Session(self._engine) as session, session.begin():
-                return work(session)
+            assert self._engine is not None
+            with self._engine.begin() as connection:
+                return work(connection)
 
         return await self._in_thread(transaction)
 
@@ -125,7 +124,7 @@ class Database:
         with engine.begin() as connection:
             version: int = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
             if version == 0:
-                Table.metadata.create_all(connection)
+                TABLES.create_all(connection)
                 connection.exec_driver_sql(f"PRAGMA user_version = {schema_version()}")
         if version > schema_version():
             raise StoreError(

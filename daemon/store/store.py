@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
-from sqlalchemy import ColumnElement, case, func, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Connection, Row, case, func, insert, select, update
 
 from daemon.errors import UnknownCalibrationError, UnknownRunError
 from daemon.store.answers import StoredAnswers
@@ -20,7 +19,7 @@ from daemon.store.records import (
     RunState,
     checksum_of,
 )
-from daemon.store.tables import CalibrationRow, RunRow
+from daemon.store.tables import CALIBRATIONS, RUNS, fields_of
 
 
 class Store:
@@ -54,8 +53,7 @@ class Store:
     async def check_writable(self) -> None:
         """Write, though nothing new, and have it on disk; raises StoreError where that cannot be done."""
 
-        def work(session: Session) -> None:
-            connection = session.connection()
+        def work(connection: Connection) -> None:
             version = connection.exec_driver_sql("PRAGMA user_version").scalar_one()
             connection.exec_driver_sql(f"PRAGMA user_version = {version}")
 
@@ -69,26 +67,26 @@ class Store:
         """Mark the runs that an earlier daemon left unfinished, and return them."""
         now = datetime.now(UTC)
 
-        def work(session: Session) -> list[RunRecord]:
-            rows = session.scalars(select(RunRow).where(RunRow.state.in_(["running", "paused"]))).all()
-            for row in rows:
-                row.state, row.ended_at = RunState.INTERRUPTED, now
-                row.error = (
-                    "the daemon ended while this run was under way: "
-                    "resume it, or solve the views taken so far as they are"
-                )
-            return [_run(row) for row in rows]
-
-        return await self._database.transact(work)
+        interrupt = (
+            update(RUNS)
+            .where(RUNS.c.state.in_([RunState.RUNNING, RunState.PAUSED]))
+            .values(
+                state=RunState.INTERRUPTED,
+                ended_at=now,
+                error="the daemon ended while this run was under way: "
+                "resume it, or solve the views taken so far as they are",
+            )
+            .returning(*RUNS.c)
+        )
+        return await self._database.transact(
+            lambda connection: [_run(row) for row in connection.execute(interrupt)]
+        )
 
     async def add_run(self, run: RunRecord) -> None:
         """Store a new run."""
-
-        def work(session: Session) -> None:
-            fields = {name: getattr(run, name) for name in RunRecord.__dataclass_fields__}
-            session.add(RunRow(**fields | {"state": run.state.value}))
-
-        await self._database.transact(work)
+        await self._database.transact(
+            lambda connection: connection.execute(insert(RUNS).values(fields_of(run)))
+        )
 
     async def change_run(
         self,
@@ -99,134 +97,109 @@ class Store:
         calibration: CalibrationRecord | None = None,
     ) -> RunRecord:
         """Move a run to `state`; a `calibration` is stored, and activated if it says so, in the same transaction."""
+        changes = {
+            "state": state,
+            "error": error,
+            "ended_at": datetime.now(UTC) if state.over else None,
+        }
+        if calibration is not None:
+            changes["calibration_id"] = calibration.id
 
-        def work(session: Session) -> RunRecord:
-            row = _find_run(session, run_id)
-            row.state, row.error = state.value, error
-            row.ended_at = datetime.now(UTC) if state.over else None
+        def work(connection: Connection) -> RunRecord:
             if calibration is not None:
-                _add(session, calibration)
-                row.calibration_id = calibration.id
-            return _run(row)
+                _add(connection, calibration)
+            connection.execute(update(RUNS).where(RUNS.c.id == run_id).values(changes))
+            return _run_of(connection, run_id)
 
         return await self._database.transact(work)
 
     async def run(self, run_id: str) -> RunRecord:
         """Return one run; raises UnknownRunError."""
-        return await self._database.transact(lambda session: _run(_find_run(session, run_id)))
+        return await self._database.transact(lambda connection: _run_of(connection, run_id))
 
     async def runs(self) -> Sequence[RunRecord]:
         """Return all runs, the newest first."""
-        newest_first = select(RunRow).order_by(RunRow.created_at.desc(), RunRow.id.desc())
+        newest_first = select(RUNS).order_by(RUNS.c.created_at.desc(), RUNS.c.id.desc())
         return await self._database.transact(
-            lambda session: [_run(row) for row in session.scalars(newest_first)]
+            lambda connection: [_run(row) for row in connection.execute(newest_first)]
         )
 
     async def calibrations(self) -> Sequence[CalibrationSummary]:
         """Return all calibrations without their documents, the newest first."""
         columns = select(
-            CalibrationRow.id,
-            CalibrationRow.created_at,
-            CalibrationRow.method,
-            CalibrationRow.active,
-            CalibrationRow.run_id,
+            CALIBRATIONS.c.id,
+            CALIBRATIONS.c.created_at,
+            CALIBRATIONS.c.method,
+            CALIBRATIONS.c.active,
+            CALIBRATIONS.c.run_id,
             _of_document("$.quality.judgement"),
             _of_document("$.quality.verdict"),
-        ).order_by(CalibrationRow.created_at.desc(), CalibrationRow.id.desc())
+        ).order_by(CALIBRATIONS.c.created_at.desc(), CALIBRATIONS.c.id.desc())
         return await self._database.transact(
-            lambda session: [CalibrationSummary(*row) for row in session.execute(columns)]
+            lambda connection: [CalibrationSummary(*row) for row in connection.execute(columns)]
         )
 
     async def calibration(self, calibration_id: str) -> CalibrationRecord:
         """Return one calibration; raises UnknownCalibrationError."""
-        return await self._database.transact(
-            lambda session: _calibration(_find_calibration(session, calibration_id))
-        )
+        return await self._database.transact(lambda connection: _calibration_of(connection, calibration_id))
 
     async def active_and_earlier(self) -> Sequence[str]:
         """Return the ids of the active calibration and of those made before it, the newest first; or none at all."""
-        made = select(CalibrationRow.created_at).where(CalibrationRow.active).scalar_subquery()
+        made = select(CALIBRATIONS.c.created_at).where(CALIBRATIONS.c.active).scalar_subquery()
         ids = (
-            select(CalibrationRow.id)
-            .where(CalibrationRow.created_at <= made)
+            select(CALIBRATIONS.c.id)
+            .where(CALIBRATIONS.c.created_at <= made)
             .order_by(
-                CalibrationRow.active.desc(), CalibrationRow.created_at.desc(), CalibrationRow.id.desc()
+                CALIBRATIONS.c.active.desc(), CALIBRATIONS.c.created_at.desc(), CALIBRATIONS.c.id.desc()
             )
         )
-        return await self._database.transact(lambda session: session.scalars(ids).all())
+        return await self._database.transact(lambda connection: connection.scalars(ids).all())
 
     async def activate(self, calibration_id: str) -> CalibrationRecord:
         """Make one calibration the active one; raises UnknownCalibrationError."""
 
-        def work(session: Session) -> CalibrationRecord:
-            row = _find_calibration(session, calibration_id)
-            _deactivate_all(session)
-            row.active = True
-            session.flush()
-            return _calibration(row)
+        def work(connection: Connection) -> CalibrationRecord:
+            _deactivate_all(connection)
+            activate = update(CALIBRATIONS).where(CALIBRATIONS.c.id == calibration_id).values(active=True)
+            connection.execute(activate)
+            return _calibration_of(connection, calibration_id)
 
         return await self._database.transact(work)
 
 
 def _of_document(path: str) -> ColumnElement[str | None]:
     """Select a text in the stored document; null where it is not there, or the document is damaged."""
-    document = CalibrationRow.document
+    document = CALIBRATIONS.c.document
     return case((func.json_valid(document) == 1, func.json_extract(document, path)), else_=None)
 
 
-def _add(session: Session, calibration: CalibrationRecord) -> None:
+def _add(connection: Connection, calibration: CalibrationRecord) -> None:
     if calibration.active:
-        _deactivate_all(session)
-    fields = {name: getattr(calibration, name) for name in CalibrationRecord.__dataclass_fields__}
-    session.add(CalibrationRow(**fields | {"checksum": checksum_of(calibration.document)}))
-    session.flush()  # before the run that refers to it
+        _deactivate_all(connection)
+    fields = fields_of(calibration) | {"checksum": checksum_of(calibration.document)}
+    connection.execute(insert(CALIBRATIONS).values(fields))
 
 
-def _deactivate_all(session: Session) -> None:
-    session.execute(update(CalibrationRow).where(CalibrationRow.active).values(active=False))
+def _deactivate_all(connection: Connection) -> None:
+    connection.execute(update(CALIBRATIONS).where(CALIBRATIONS.c.active).values(active=False))
 
 
-def _find_run(session: Session, run_id: str) -> RunRow:
-    row = session.get(RunRow, run_id)
+def _run_of(connection: Connection, run_id: str) -> RunRecord:
+    row = connection.execute(select(RUNS).where(RUNS.c.id == run_id)).one_or_none()
     if row is None:
         raise UnknownRunError(f"there is no run '{run_id}': GET /api/v1/runs lists those that there are")
-    return row
+    return _run(row)
 
 
-def _find_calibration(session: Session, calibration_id: str) -> CalibrationRow:
-    row = session.get(CalibrationRow, calibration_id)
+def _calibration_of(connection: Connection, calibration_id: str) -> CalibrationRecord:
+    found = select(CALIBRATIONS).where(CALIBRATIONS.c.id == calibration_id)
+    row = connection.execute(found).one_or_none()
     if row is None:
         raise UnknownCalibrationError(
             f"there is no calibration '{calibration_id}': GET /api/v1/calibrations lists those that there are"
         )
-    return row
+    return CalibrationRecord(**row._asdict())
 
 
-def _run(row: RunRow) -> RunRecord:
-    return RunRecord(
-        row.id,
-        RunState(row.state),
-        row.profile_name,
-        row.profile,
-        row.session,
-        row.owner,
-        row.note,
-        row.created_at,
-        row.started_at,
-        row.ended_at,
-        row.error,
-        row.calibration_id,
-    )
-
-
-def _calibration(row: CalibrationRow) -> CalibrationRecord:
-    return CalibrationRecord(
-        row.id,
-        row.created_at,
-        row.method,
-        row.active,
-        row.run_id,
-        row.document,
-        row.verification,
-        row.checksum,
-    )
+def _run(row: Row[Any]) -> RunRecord:
+    return RunRecord(**row._asdict() | {"state": RunState(row.state)})

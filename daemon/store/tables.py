@@ -1,9 +1,27 @@
 """The tables of the database. Times are in UTC; documents are JSON texts, kept as they were written."""
 
+import dataclasses
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Final
 
-from sqlalchemy import DateTime, Dialect, ForeignKey, Index, Text, TypeDecorator, text
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy import (
+    Boolean,
+    Column,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+    TypeDecorator,
+    text,
+)
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -21,90 +39,89 @@ class UtcDateTime(TypeDecorator[datetime]):
         return None if value is None else value.replace(tzinfo=UTC)
 
 
-class Table(DeclarativeBase):
-    """Base of the tables."""
+TABLES: Final = MetaData()
 
-    type_annotation_map = {datetime: UtcDateTime, str: Text}  # noqa: RUF012  SQLAlchemy reads it so
+CALIBRATIONS: Final = Table(
+    "calibrations",
+    TABLES,
+    Column("id", Text, primary_key=True),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("method", Text, nullable=False),
+    Column("document", Text, nullable=False),
+    Column("verification", Text),
+    Column("active", Boolean, nullable=False),
+    Column("run_id", Text),
+    Column("checksum", Text),
+    Index("one_active_calibration", "active", unique=True, sqlite_where=text("active")),
+)
+"""Calibrations, whose documents are never changed.
+
+`verification` is what the held-out views said, as JSON; `checksum` the document's SHA-256, in hexadecimal digits, null
+where it was stored by an activecam that kept none.
+"""
+
+RUNS: Final = Table(
+    "runs",
+    TABLES,
+    Column("id", Text, primary_key=True),
+    Column("state", Text, nullable=False),
+    Column("profile_name", Text, nullable=False),
+    Column("profile", Text, nullable=False),
+    Column("session", Text, nullable=False),
+    Column("owner", Text, nullable=False),
+    Column("note", Text, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("started_at", UtcDateTime),
+    Column("ended_at", UtcDateTime),
+    Column("error", Text),
+    Column("calibration_id", Text, ForeignKey("calibrations.id")),
+)
+"""Calibration runs; `profile` is as it was when the run was created, `session` its folder, from the data folder."""
+
+ANSWERS: Final = Table(
+    "answers",
+    TABLES,
+    Column("key", Text, primary_key=True),
+    Column("fingerprint", Text, nullable=False),
+    Column("asked_at", UtcDateTime, nullable=False),
+    Column("status", Integer),
+    Column("media_type", Text),
+    Column("body", LargeBinary),
+    Column("location", Text),
+)
+"""What requests with an idempotency key were answered; one without a status was not answered yet.
+
+`fingerprint` is a hash of what tells the request from others.
+"""
+
+API_KEYS: Final = Table(
+    "api_keys",
+    TABLES,
+    Column("name", Text, primary_key=True),
+    Column("role", Text, nullable=False),
+    Column("digest", Text, nullable=False, unique=True),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("last_used_at", UtcDateTime),
+)
+"""API keys, of which the hashes alone are kept."""
+
+AUDIT: Final = Table(
+    "audit",
+    TABLES,
+    Column("id", Integer, primary_key=True),
+    Column("time", UtcDateTime, nullable=False),
+    Column("who", Text),
+    Column("role", Text, nullable=False),
+    Column("address", Text, nullable=False),
+    Column("method", Text, nullable=False),
+    Column("path", Text, nullable=False),
+    Column("asked", Text, nullable=False),
+    Column("status", Integer),
+    Column("code", Text),
+)
+"""What somebody did."""
 
 
-class RunRow(Table):
-    """A calibration run."""
-
-    __tablename__ = "runs"
-
-    id: Mapped[str] = mapped_column(primary_key=True)
-    state: Mapped[str]
-    profile_name: Mapped[str]
-    profile: Mapped[str]
-    """The profile as it was when the run was created."""
-    session: Mapped[str]
-    """The session's folder, from the data folder."""
-    owner: Mapped[str]
-    note: Mapped[str]
-    created_at: Mapped[datetime]
-    started_at: Mapped[datetime | None]
-    ended_at: Mapped[datetime | None]
-    error: Mapped[str | None]
-    calibration_id: Mapped[str | None] = mapped_column(ForeignKey("calibrations.id"))
-
-
-class AnswerRow(Table):
-    """What a request with an idempotency key was answered; without a status, it was not answered yet."""
-
-    __tablename__ = "answers"
-
-    key: Mapped[str] = mapped_column(primary_key=True)
-    fingerprint: Mapped[str]
-    """A hash of what tells the request from others."""
-    asked_at: Mapped[datetime]
-    status: Mapped[int | None]
-    media_type: Mapped[str | None]
-    body: Mapped[bytes | None]
-    location: Mapped[str | None]
-
-
-class CalibrationRow(Table):
-    """A calibration; its document is never changed."""
-
-    __tablename__ = "calibrations"
-    __table_args__ = (Index("one_active_calibration", "active", unique=True, sqlite_where=text("active")),)
-
-    id: Mapped[str] = mapped_column(primary_key=True)
-    created_at: Mapped[datetime]
-    method: Mapped[str]
-    document: Mapped[str]
-    verification: Mapped[str | None]
-    """What the held-out views said, as JSON."""
-    active: Mapped[bool]
-    run_id: Mapped[str | None]
-    checksum: Mapped[str | None]
-    """The document's SHA-256, in hexadecimal digits; None where it was stored by an activecam that kept none."""
-
-
-class ApiKeyRow(Table):
-    """An API key, of which the hash alone is kept."""
-
-    __tablename__ = "api_keys"
-
-    name: Mapped[str] = mapped_column(primary_key=True)
-    role: Mapped[str]
-    digest: Mapped[str] = mapped_column(unique=True)
-    created_at: Mapped[datetime]
-    last_used_at: Mapped[datetime | None]
-
-
-class AuditRow(Table):
-    """What somebody did."""
-
-    __tablename__ = "audit"
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    time: Mapped[datetime]
-    who: Mapped[str | None]
-    role: Mapped[str]
-    address: Mapped[str]
-    method: Mapped[str]
-    path: Mapped[str]
-    asked: Mapped[str]
-    status: Mapped[int | None]
-    code: Mapped[str | None]
+def fields_of(record: "DataclassInstance") -> dict[str, Any]:
+    """Return a record's fields, which are columns of its table."""
+    return {field.name: getattr(record, field.name) for field in dataclasses.fields(record)}

@@ -77,7 +77,7 @@ async def test_whoever_asks_how_often_the_store_is_written_to_once(
 
 async def test_a_store_that_fails_is_in_the_way(service: Service, client: httpx.AsyncClient) -> None:
     await service.store._database.transact(
-        lambda session: session.connection().exec_driver_sql("PRAGMA query_only = ON")
+        lambda connection: connection.exec_driver_sql("PRAGMA query_only = ON")
     )
     status, [sentence] = await ready(client)
     assert (status, "readonly database" in sentence) == (503, True)

@@ -75,9 +75,7 @@ async def test_the_rig_and_its_work_are_shown(service: Service, client: httpx.As
 async def test_errors_of_the_store_are_counted(
     service: Service, client: httpx.AsyncClient, tmp_path: Path
 ) -> None:
-    await service.store._database.transact(
-        lambda session: session.connection().exec_driver_sql("DROP TABLE runs")
-    )
+    await service.store._database.transact(lambda connection: connection.exec_driver_sql("DROP TABLE runs"))
     with pytest.raises(StoreError):
         await service.store.runs()
     assert sample(await scrape(client), "store_errors_total") == 1
