@@ -6,6 +6,7 @@ from typing import Final
 
 from calib.errors import CalibError
 from daemon.errors import ExportUnavailableError, UnknownExportError
+from daemon.export.making_reports import made_apart
 from daemon.export.session_archive import archive_of
 from daemon.export.subject import Subject
 from daemon.export.urdf import urdf, urdf_notes
@@ -51,25 +52,12 @@ def _report_size(_: Subject, __: str | None) -> None:
     """Return nothing: a report is always to be had, and takes seconds to make."""
 
 
-def _report_html(subject: Subject, _: str | None) -> bytes:
-    # With matplotlib and the solver, which a daemon that serves poses does without.
-    from daemon.export.report import html, report
-
-    return html(report(subject))
-
-
-def _report_pdf(subject: Subject, _: str | None) -> bytes:
-    from daemon.export.report import pdf, report
-
-    return pdf(report(subject))
-
-
 EXPORTS: Final = (
     Export(
         "report.pdf",
         "application/pdf",
         "a report for the lab book",
-        _report_pdf,
+        lambda subject, _: made_apart("pdf", subject),
         looks=True,
         size=_report_size,
     ),
@@ -77,7 +65,7 @@ EXPORTS: Final = (
         "report.html",
         "text/html",
         "the same for a browser, in one file",
-        _report_html,
+        lambda subject, _: made_apart("html", subject),
         looks=True,
         size=_report_size,
     ),

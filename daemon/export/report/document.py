@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class Facts:
 class Panel:
     """One of the drawings of a figure, and how wide it is beside the others."""
 
-    draw: Callable[["Axes"], None]
+    draw: Callable[[Axes], None]
     share: float = 1.0
     right: float = 4.0
     """What is left free beside it (mm)."""

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from math import ceil, log10
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from calib import Calibration
@@ -12,11 +13,8 @@ from calib.residual_map import ViewMisses
 from calib.stated_quality import CameraCoverage, Quality, ViewQuality
 from calib.verification import JointTravel
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 Array = NDArray[np.float64]
-Draw = Callable[["Axes"], None]
+Draw = Callable[[Axes], None]
 
 COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 MARKERS: Final = "osD^vP"
@@ -31,7 +29,7 @@ def travel_errors(travels: Sequence[JointTravel], kind: str) -> Draw:
     unit, coarse = ("mm", 1e3) if kind == "prismatic" else ("deg", np.degrees(1))
     names = list(dict.fromkeys(travel.joint for travel in travels))
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         for travel in travels:
             if travel.kind == kind:
                 way = names.index(travel.joint)
@@ -58,7 +56,7 @@ def view_errors(quality: Quality) -> Draw:
         held_out = quality.held_out_by == "leave_one_view_out" and view.held_out_px is not None
         return view.held_out_px if held_out and not view.set_aside else view.rms_px
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         kinds = {
             "fit": [view for view in quality.views if view.use == "fit" and not view.set_aside],
             "held out": [view for view in quality.views if view.use == "verify"],
@@ -84,7 +82,7 @@ def by_direction(views: Sequence[ViewMisses]) -> Draw:
     """Draw all points' residuals as they point: a cloud round the middle, or something that is missing in the model."""
     away = np.concatenate([view.misses for view in views])
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         reach = _round_up(float(np.quantile(np.abs(away), 0.995)) * 1.15)
         axes.plot(*away.T, ".", color=COLOURS[0], markersize=2, alpha=0.35, rasterized=True)
         rms = float(np.sqrt((away**2).sum(axis=1).mean()))
@@ -118,7 +116,7 @@ def by_place(views: Sequence[ViewMisses], size: tuple[int, int]) -> Draw:
         mean = np.column_stack([np.bincount(index, way, rows * columns) for way in away.T]) / count[:, None]
         rms = np.sqrt(np.bincount(index, (away**2).sum(axis=1), rows * columns) / count)
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         width, height = size
         shade = axes.imshow(
             np.ma.masked_invalid(rms.reshape(CELLS)),
@@ -157,7 +155,7 @@ def by_place(views: Sequence[ViewMisses], size: tuple[int, int]) -> Draw:
 def cells_covered(covered: CameraCoverage) -> Draw:
     """Draw how many points were seen in each cell of the picture."""
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         cells = np.array(covered.cells)
         axes.imshow(np.log1p(cells), cmap="Greens", vmin=0, vmax=1.6 * np.log1p(cells.max()), aspect="auto")
         for (row, column), count in np.ndenumerate(cells):
@@ -173,7 +171,7 @@ def views_cover(covered: CameraCoverage) -> Draw:
     """Draw how different the views are, each way as a share of what is enough."""
     shares = {"X": covered.x, "Y": covered.y, "size": covered.size, "skew": covered.skew}
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         axes.barh(list(shares), [100 * share for share in shares.values()], color=COLOURS[2], height=0.6)
         axes.set(xlim=(0, 100), ylim=(3.6, -0.6))
         axes.set_xlabel("of what is enough (%)")
@@ -186,7 +184,7 @@ def certainty(calibration: Calibration, part: slice, what: str) -> Draw:
     low, high = np.array(calibration.range, dtype=float).T
     share = np.linspace(0, 1, ALONG)
 
-    def draw(axes: "Axes") -> None:
+    def draw(axes: Axes) -> None:
         for way, joint in enumerate(calibration.joints):
             readings = np.tile((low + high) / 2, (ALONG, 1))
             readings[:, way] = low[way] + share * (high - low)[way]
@@ -209,7 +207,7 @@ def _round_up(value: float) -> float:
     return step * ceil(value / step)
 
 
-def _legend(axes: "Axes") -> None:
+def _legend(axes: Axes) -> None:
     """Name what is drawn above the axes, where no data can be, and each name once."""
     handles, names = axes.get_legend_handles_labels()
     once = dict(zip(names, handles, strict=True))

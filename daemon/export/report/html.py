@@ -7,13 +7,16 @@ from importlib.resources import files
 from io import BytesIO
 from typing import assert_never
 
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
 from daemon.export.report.document import Block, Drawing, Facts, Heading, Report, Table, Verdict, Words
-from daemon.export.report.layout import MM_AN_INCH, WIDTH, draw, settings
+from daemon.export.report.layout import MM_AN_INCH, SETTINGS, WIDTH, draw
 
 
 def html(report: Report) -> bytes:
     """Return the report as a page that says the same wherever it is opened."""
-    with settings():
+    with mpl.rc_context(SETTINGS):
         body = "\n".join(_block(block) for block in report.blocks)
     title = escape(report.title)
     style = files("daemon.export.report").joinpath("report.css").read_text(encoding="utf-8")
@@ -65,8 +68,6 @@ def _cells(cells: Sequence[str], words: int, tag: str) -> str:
 
 
 def _svg(drawing: Drawing) -> bytes:
-    from matplotlib.figure import Figure
-
     size = WIDTH, drawing.height
     page = Figure(figsize=(WIDTH / MM_AN_INCH, drawing.height / MM_AN_INCH))
     draw(drawing, page, 0.0, 0.0, size)

@@ -1,14 +1,11 @@
-"""How figures look, on paper and on screen, and the lock that matplotlib's settings need."""
+"""How figures look, on paper and on screen."""
 
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
+
+from matplotlib.figure import Figure
 
 from daemon.export.report.document import Drawing
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 WIDTH: Final = 174.0
 """Of all that is laid out (mm): A4, less its margins."""
@@ -33,21 +30,11 @@ SETTINGS: Final[dict[Any, Any]] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "activecam",
 }
-"""Fonts that come with matplotlib, so that the same report is the same file; those of a PDF can be searched."""
-
-_drawing = threading.Lock()
-
-
-@contextmanager
-def settings() -> Iterator[None]:
-    """Let figures look so; matplotlib has one set of settings, and so one report is drawn at a time."""
-    import matplotlib as mpl
-
-    with _drawing, mpl.rc_context(SETTINGS):
-        yield
+"""As of `matplotlib.rc_context`. The fonts come with matplotlib, so that the same report is the same file; those of a
+PDF can be searched."""
 
 
-def draw(drawing: Drawing, page: "Figure", left: float, top: float, size: tuple[float, float]) -> None:
+def draw(drawing: Drawing, page: Figure, left: float, top: float, size: tuple[float, float]) -> None:
     """Draw panels side by side on a page of this `size`, from its left and its top edge on; all in mm."""
     width, height = size
     for (start, share), panel in zip(_places(drawing), drawing.panels, strict=True):

@@ -2,14 +2,17 @@
 
 from collections.abc import Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, Final, assert_never
+from typing import Any, Final, assert_never
+
+import matplotlib as mpl
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.patches import Rectangle
+from matplotlib.textpath import text_to_path
 
 from daemon.export.report.document import Block, Drawing, Facts, Heading, Report, Table, Verdict, Words
-from daemon.export.report.layout import MM_AN_INCH, WIDTH, draw, settings
-
-if TYPE_CHECKING:
-    from matplotlib.backends.backend_pdf import PdfPages
-    from matplotlib.figure import Figure
+from daemon.export.report.layout import MM_AN_INCH, SETTINGS, WIDTH, draw
 
 A4: Final = (210.0, 297.0)
 MARGIN: Final = (A4[0] - WIDTH) / 2
@@ -30,10 +33,11 @@ JUDGED: Final = {"good": "#007a55", "usable": "#b36b00", "poor": "#b00020"}
 
 def pdf(report: Report) -> bytes:
     """Return the report as a PDF file."""
-    from matplotlib.backends.backend_pdf import PdfPages
-
     file = BytesIO()
-    with settings(), PdfPages(file, metadata={"Title": report.title, "CreationDate": None}) as pages:
+    with (
+        mpl.rc_context(SETTINGS),
+        PdfPages(file, metadata={"Title": report.title, "CreationDate": None}) as pages,
+    ):
         sheet = _Sheet(pages, report.title)
         sheet.words(report.title, TITLE, weight="bold")
         for block, following in zip(report.blocks, [*report.blocks[1:], None], strict=True):
@@ -66,7 +70,7 @@ def _set(sheet: "_Sheet", block: Block, following: Block | None) -> None:
 class _Sheet:
     """The page that is being set, and how far down it is."""
 
-    def __init__(self, pages: "PdfPages", title: str) -> None:
+    def __init__(self, pages: PdfPages, title: str) -> None:
         self._pages, self._title = pages, title
         self._number = 0
         self._page = self._fresh()
@@ -138,9 +142,7 @@ class _Sheet:
             self._line(line, SMALL, MARGIN, color="#444444")
         self.skip(GAP)
 
-    def _fresh(self) -> "Figure":
-        from matplotlib.figure import Figure
-
+    def _fresh(self) -> Figure:
         self._number += 1
         page = Figure(figsize=(A4[0] / MM_AN_INCH, A4[1] / MM_AN_INCH))
         foot: dict[str, Any] = {"fontsize": SMALL, "color": "#444444", "parse_math": False, "va": "baseline"}
@@ -171,8 +173,6 @@ class _Sheet:
         self._page.text(x / A4[0], y, text, fontsize=size, ha=side, va="baseline", parse_math=False, **style)
 
     def _bar(self, top: float, height: float, colour: str) -> None:
-        from matplotlib.patches import Rectangle
-
         corner = MARGIN / A4[0], 1 - (top + height) / A4[1]
         self._page.add_artist(Rectangle(corner, 2 / A4[0], height / A4[1], color=colour, linewidth=0))
 
@@ -206,8 +206,5 @@ def _lines(text: str, size: float, width: float, weight: str) -> list[str]:
 
 
 def _width(text: str, size: float, weight: str) -> float:
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
     font = FontProperties(size=size, weight=weight)
     return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) * MM_A_POINT

@@ -15,7 +15,9 @@ import pytest
 
 from calib import Calibration, Session, solve
 from calib.session_writer import SessionWriter
+from daemon.errors import ExportError
 from daemon.export import Subject
+from daemon.export.making_reports import made_apart
 from daemon.export.report import html, pdf, report
 from daemon.export.report.document import Drawing, Facts, Heading, Table, Verdict, Words
 from tests.calib.scenes import DISK_CENTRES, DISKS, plan, points_session, two_axis_rig
@@ -235,6 +237,15 @@ def test_no_words_of_a_page_lie_on_others_or_off_it(name: str, subject: Subject)
             across = min(one[2], other[2]) - max(one[0], other[0])
             down = min(one[3], other[3]) - max(one[1], other[1])
             assert min(across, down) < 0.5, (one, other)
+
+
+def test_one_that_is_made_apart_is_the_same_and_an_error_there_is_one_here(
+    subject: Subject, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert made_apart("html", subject) == html(report(subject))
+    with pytest.raises(ExportError, match="an error in the program"):
+        made_apart("html", replace(subject, verification="[]"))
+    assert "ValidationError" in caplog.text
 
 
 def test_the_same_calibration_makes_the_same_files(subject: Subject) -> None:
