@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 from typing import Any, Final, Literal
 
 from fastapi import APIRouter, WebSocket
@@ -56,8 +56,8 @@ async def follow_live(socket: WebSocket) -> None:
     try:
         await first_of(
             send(socket, service.streams.follow(client.states(states))),
-            send(socket, service.streams.follow(_events(service))),
-            send(socket, service.streams.follow(client.answers())),
+            send(socket, _events(service)),
+            send(socket, client.answers()),
             client.obey(),
         )
     finally:
@@ -83,7 +83,7 @@ class Client:
             holds = current is not None and current.token == self._token
             yield f'{state[:-1]},"you":{to_json(self._who | {"holds_lease": holds}).decode()}}}'
 
-    async def answers(self) -> AsyncIterator[str]:
+    async def answers(self) -> AsyncGenerator[str]:
         """Yield what each command has come to, in the order in which they do."""
         while True:
             yield await self._answered.get()
@@ -126,7 +126,7 @@ class Client:
                 self._leases.release(self._token)
 
 
-async def _events(service: Service) -> AsyncIterator[str]:
+async def _events(service: Service) -> AsyncGenerator[str]:
     """Yield the events of the latest run, and of each one after it, from its first."""
     followed, told = None, dict[str, int]()
     while True:

@@ -21,7 +21,7 @@ async def first_of(*works: Coroutine[Any, Any, None]) -> None:
         task.result()
 
 
-async def send(socket: WebSocket, messages: AsyncGenerator[str | bytes | None]) -> None:
+async def send(socket: WebSocket, messages: AsyncGenerator[str | bytes | None] | AsyncGenerator[str]) -> None:
     """Send `messages`, text as text, until they or the client end; None is none."""
     with contextlib.suppress(WebSocketDisconnect):
         async with contextlib.aclosing(messages):

@@ -11,7 +11,6 @@ from daemon.api import live_state
 from daemon.api.live_state import LiveState
 from daemon.client_motion import ClientMotions
 from daemon.service import Service
-from tests.daemon.motions import until
 
 
 @pytest.fixture
@@ -115,18 +114,6 @@ async def test_a_stop_waits_for_no_command_before_it(
         late = await message(socket, "answer")
         assert (late["id"], late["problem"]["code"]) == ("late", "stop_latched")
         assert (await ask(socket, do="acknowledge"))["body"]["latched"] is False
-
-
-async def test_a_lease_ends_with_its_socket_and_so_do_its_motions(service: Service, live: str) -> None:
-    async with connect(live) as socket:
-        await ask(socket, do="lease", owner="anna")
-        await ask(socket, do="jog", axis="slide", distance=90)
-        assert service.rig.axis("slide").moving
-    await until(service.rig, lambda snapshot: not snapshot.axis("slide").moving)
-    assert service.leases.current is None
-    assert (
-        "its lease ended" in str(service.rig.axis("slide").last_error) or service.rig.axis("slide").last_error
-    )
 
 
 async def test_what_is_no_command_is_refused_in_words(live: str) -> None:
