@@ -70,5 +70,5 @@ export function moment(time) {
 
 /** Return a message of the daemon, which begins small and has no full stop, as a sentence by itself. */
 export function sentenceOf(message) {
-  return `${message[0].toUpperCase()}${message.slice(1)}.`;
+  return `${message[0].toUpperCase()}${message.slice(1)}${/[.?!]$/.test(message) ? "" : "."}`;
 }
