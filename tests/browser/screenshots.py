@@ -181,7 +181,7 @@ STATES: Final[dict[str, State]] = {
 GUARDED: Final[dict[str, State]] = {"key": asked_for_a_key, "viewer": seen_by_a_viewer}
 """Where keys are asked for."""
 
-DOCUMENTED: Final = ("rig-homed", "calibrate", "calibrating", "calibrated")
+DOCUMENTED: Final = ("rig-homed", "calibrate", "calibrating", "calibrated", "judge-views")
 """Those that the documentation shows."""
 DOCUMENTATION: Final = Path(__file__).parents[2] / "docs" / "screenshots"
 SHOWN: Final = 1080
