@@ -13,6 +13,9 @@ with Client("http://localhost:8080") as camera:
 from activecam_client.client import Client
 from activecam_client.documents import (
     Axis,
+    CalibrationEntry,
+    Check,
+    Comparison,
     Event,
     PastPose,
     Pose,
@@ -30,7 +33,10 @@ from activecam_client.run import Run
 __all__ = [
     "ActivecamError",
     "Axis",
+    "CalibrationEntry",
+    "Check",
     "Client",
+    "Comparison",
     "Event",
     "Lease",
     "PastPose",

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from activecam_client.connection import Connection
 from activecam_client.documents import (
+    CalibrationEntry,
+    Check,
+    Comparison,
     PastPose,
     Pose,
     PoseAtReadings,
@@ -140,6 +143,26 @@ class Client:
     def run_of(self, run_id: str) -> Run:
         """Return a run that was started before, by its id: to follow it, to resume it, or to solve it anew."""
         return Run(self._connection, run_id)
+
+    def checklist(self, from_here: Sequence[str] = ()) -> list[Check]:
+        """Return what stands for and against a run, `from_here` as for one."""
+        answer = self._connection.ask("GET", "/runs/checklist", query={"from_here": list(from_here)})
+        return [Check.model_validate(check) for check in answer["checks"]]
+
+    def calibrations(self) -> list[CalibrationEntry]:
+        """Return all calibrations, the newest first."""
+        answer = self._connection.ask("GET", "/calibrations")
+        return [CalibrationEntry.model_validate(calibration) for calibration in answer]
+
+    def activate(self, calibration_id: str) -> CalibrationEntry:
+        """Have poses computed from a calibration, from now on and after every restart."""
+        answer = self._connection.ask("POST", f"/calibrations/{calibration_id}/activate")
+        return CalibrationEntry.model_validate(answer)
+
+    def compare(self, calibration_id: str, other_id: str) -> Comparison:
+        """Return whether two calibrations of this rig say the same."""
+        answer = self._connection.ask("GET", f"/calibrations/{calibration_id}/compare/{other_id}")
+        return Comparison.model_validate(answer)
 
     def stop(self) -> Stop:
         """Stop everything at once, and return when all axes stand; nothing moves before it is acknowledged."""

@@ -39,7 +39,7 @@ class Connection:
         path: str,
         body: Mapping[str, Any] | None = None,
         *,
-        query: Mapping[str, str] | None = None,
+        query: Mapping[str, str | list[str]] | None = None,
         headers: Mapping[str, str] | None = None,
         patience: float | None = PATIENCE,
     ) -> Any:

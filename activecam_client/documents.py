@@ -121,6 +121,37 @@ class RunRecord(Document):
     calibration_id: str | None
 
 
+class Check(Document):
+    """Something to look at before a run; `ok` is None where that is not known, or the run sees to it itself."""
+
+    name: str
+    title: str
+    ok: bool | None
+    message: str
+
+
+class CalibrationEntry(Document):
+    """A stored calibration: whether poses are computed from it, and what it is worth."""
+
+    id: str
+    created_at: datetime
+    active: bool
+    run_id: str | None
+    judgement: str | None
+    verdict: str | None
+
+
+class Comparison(Document):
+    """Whether two calibrations say the same, in a sentence, and once more apart from where the target stood.
+
+    None where they do not say how sure they are.
+    """
+
+    sentence: str
+    agree: bool | None
+    agree_apart_from_world: bool | None
+
+
 class View(Document):
     """A view of a run.
 

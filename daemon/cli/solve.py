@@ -45,6 +45,12 @@ def solve(
             help="A parameter that is kept instead of found, such as pan.scale or main.k3=0. May be repeated.",
         ),
     ] = None,
+    leave_out: Annotated[
+        list[int] | None,
+        typer.Option(
+            min=0, help="A view that is not used, by its number in the session, from 0. May be repeated."
+        ),
+    ] = None,
     target_warp: Annotated[
         bool, typer.Option("--target-warp", help="Let the target bulge, if the data support it.")
     ] = False,
@@ -59,7 +65,7 @@ def solve(
         )
     loaded = load_session(session)
     try:
-        holding = loaded.holding(dict(map(_held, hold or [])))
+        holding = loaded.holding(dict(map(_held, hold or []))).leaving_out(leave_out or [])
     except FormatError as error:
         raise typer.BadParameter(str(error)) from None
     with progress_line() as progress:

@@ -51,6 +51,25 @@ def test_what_is_held_is_printed(session: Path, capsys: pytest.CaptureFixture[st
     assert "Held, not found: slide.scale at 0.001, pan.axis at 0.02,0.9,-0.5" in capsys.readouterr().out
 
 
+def test_views_are_left_out_of_the_result_and_not_of_the_session(
+    session: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = session.read_text()
+    left_out = ["--leave-out", "3", "--leave-out", "12"]
+    with pytest.raises(SystemExit) as ended:
+        main(["solve", str(session), "-o", str(session.with_name("c.json")), "--json", *left_out])
+    assert ended.value.code == 0
+    quality = json.loads(capsys.readouterr().out)["quality"]
+    assert [view["view"] for view in quality["views"] if view["use"] == "none"] == [3, 12]
+    assert [joint["views"] for joint in quality["joints"]] == [8, 8]
+    assert "2 views left out by hand" in quality["verdict"]
+    assert session.read_text() == before
+    with pytest.raises(SystemExit) as refused:
+        main(["solve", str(session), "--leave-out", "18"])
+    assert refused.value.code == 2
+    assert "there is no view 18" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("hold", "says"),
     [

@@ -144,7 +144,22 @@ async def test_a_run_is_cut_off_resumed_and_solved_without_a_view(client: Client
         assert not any(view.left_out for view in run.views(first.calibration_id))
         assert client.rig().calibration_id == first.calibration_id
 
+        new, old = client.calibrations()
+        assert ([new.active, old.active], old.id) == ([False, True], first.calibration_id)
+        assert client.compare(old.id, new.id).agree
+        assert client.activate(new.id).active
+        assert client.rig().calibration_id == new.id
+
     await aside(calibrate)
+
+
+async def test_what_is_in_the_way_of_a_run_is_asked_for(client: Client, service: Service) -> None:
+    with pytest.raises(ProblemError, match=r"\(not_homed\)"):
+        await aside(lambda: client.checklist(from_here=["pan"]))
+    await home_all(service.rig)
+    await service.rig.stop("a test")
+    checks = await aside(lambda: client.checklist(from_here=["slide", "pan"]))
+    assert [check.name for check in checks if check.ok is False] == ["stop"]
 
 
 async def test_a_run_is_cancelled_and_a_stop_acknowledged(client: Client, service: Service) -> None:
