@@ -131,8 +131,7 @@ def _scroll_to(page: Page, heading: str) -> None:
     panel = page.get_by_role("region", name=heading, exact=True).bounding_box()
     assert header is not None
     assert panel is not None
-    page.mouse.wheel(0, panel["y"] - header["height"] - 12)
-    page.wait_for_function("window.scrollY > 0")
+    page.evaluate(f"window.scrollBy(0, {panel['y'] - header['height'] - 12})")
 
 
 def takeaway(page: Page, daemon: Daemon, api: httpx.Client) -> None:
