@@ -250,16 +250,9 @@ def _remarks(calibration: Calibration) -> Iterator[Block]:
 
 
 def _views(quality: Quality, session: Session | None) -> Table:
-    headings = [
-        "view",
-        "joint",
-        "use",
-        "rms (px)",
-        "held out (px)",
-        "position (mm)",
-        "rotation (mrad)",
-        "readings",
-    ]
+    headings = ["view", "joint", "use", "rms (px)", "position (mm)", "rotation (mrad)"]
+    headings += [f"held out ({unit})" for unit in ("px", "mm", "mrad")]
+    headings += ["readings"]
     rows = []
     for view in quality.views:
         readings = (
@@ -273,9 +266,11 @@ def _views(quality: Quality, session: Session | None) -> Table:
                 if view.set_aside
                 else {"verify": "held out", "none": "left out"}.get(view.use, view.use),
                 figure(view.rms_px),
-                figure(view.held_out_px),
                 figure(view.position_m, 1e3),
                 figure(view.rotation_rad, 1e3),
+                figure(view.held_out_px),
+                figure(view.held_out_position_m, 1e3),
+                figure(view.held_out_rotation_rad, 1e3),
                 several(readings, ".6g"),
             ]
         )
