@@ -74,4 +74,4 @@ $(PEERS)/.installed: benchmarks/peers-requirements.txt
 	touch $@
 
 clean: ## Take away what was installed and cached here
-	rm -rf $(VENV) $(PEERS) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(PEERS) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache .npm-for-tests

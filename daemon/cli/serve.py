@@ -45,6 +45,8 @@ def serve(
     log_to_stderr(log_format, log_level)
 
     def ready(address: str) -> None:
-        typer.echo(f"Serving '{rig.name}' at {address}/api/v1 (try it at {address}/docs)")
+        typer.echo(
+            f"Serving '{rig.name}' at {address}/api/v1 (the page: {address}/, the API described: {address}/docs)"
+        )
 
     serve_rig(rig, data, host, port, ready, host_names=host_name or (), keys=keys, tls=tls)
