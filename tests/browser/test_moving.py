@@ -1,5 +1,6 @@
 """Looking at the rig and moving it: with the mouse, with the keyboard, and stopping it."""
 
+import re
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -230,6 +231,23 @@ def test_control_is_somebody_elses_until_it_is_taken_over(
     expect(home).to_be_enabled()
     page.get_by_role("button", name="Give back").click()
     expect(page.locator("#lease")).to_contain_text("Nobody has control")
+
+
+def test_coverage_is_a_layer_over_the_picture_that_grows_with_the_run(
+    daemon: Daemon, open_page: Open, api: httpx.Client
+) -> None:
+    page = open_page(daemon.address)
+    page.get_by_label("Coverage").check()
+    expect(page.get_by_text("There is no run yet")).to_be_visible()
+    run = api.post("/runs", json={}).json()["id"]
+    with api.stream("GET", f"/runs/{run}/events") as events:
+        next(line for line in events.iter_lines() if line == "event: view")
+    expect(page.get_by_text(re.compile(rf"\d+ views? of run {run}"))).to_be_visible()
+    api.post(f"/runs/{run}/cancel")
+    size = page.get_by_role("meter", name="Size: How large")
+    assert 10 < int(size.get_attribute("aria-valuenow") or 0) <= 100
+    page.get_by_label("Coverage").uncheck()
+    expect(size).to_be_hidden()
 
 
 def test_a_tab_that_is_closed_moves_nothing_any_more(
