@@ -81,7 +81,7 @@ class Checklist:
         message = (
             f"a stop is latched ({latch.reason}): acknowledge it" if latch.engaged else "no stop is latched"
         )
-        return Check("stop", "No stop is latched", not latch.engaged, message)
+        return Check("stop", "The rig may move", not latch.engaged, message)
 
     def _nobody_else(self) -> Check:
         title, lease = "Nobody else moves the rig", self._leases.current
