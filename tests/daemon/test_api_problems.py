@@ -27,6 +27,7 @@ INSIDE = {
     daemon.PoseError,
     daemon.IdempotencyError,
     daemon.TargetUnseenError,  # ends a run, whose `error` it becomes
+    daemon.ExportError,
     daemon.BackupError,  # the command line alone makes backups
     daemon.AccessError,
     daemon.NoKeyError,  # as for ServeError

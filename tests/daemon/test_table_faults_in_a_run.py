@@ -41,8 +41,8 @@ async def test_a_fault_of_the_table_ends_the_run_with_a_sentence(fault: str, tmp
 
 
 async def test_steps_that_the_table_loses_are_found_in_the_pictures(tmp_path: Path) -> None:
-    async with running(TABLE, tmp_path, positions=7, reach=15) as course:
-        await course.told("view", position=3)
+    async with running(TABLE, tmp_path, positions=9, reach=16) as course:
+        await course.told("view", position=4)
         course.emulator.slip("slide", 1)
         run = await course.service.runs.wait(course.run.id)
         assert (run.state, run.error) == (RunState.SUCCEEDED, None)

@@ -161,7 +161,7 @@ class GrblEmulator:
         self._motor(axis).stall()
 
     def slip(self, axis: str, distance: float | str) -> None:
-        """Let an axis lose steps."""
+        """Let an axis lose steps on its next motion."""
         self._motor(axis).slip(float(distance))
 
     def unplug(self) -> None:

@@ -18,6 +18,7 @@ class Motor:
         self.shaft = shaft
         self.switch = switch
         self.stalled = False
+        self._losing = 0.0
         self._now = now
         self._counted = rest(0.0, -math.inf)
 
@@ -43,7 +44,9 @@ class Motor:
         start, shaft = self._counted.position(now), self.shaft.motor(now)
         self._counted = trapezoid(start, target, now, velocity, acceleration)
         if not self.stalled:
-            self.shaft.drive(trapezoid(shaft, shaft + target - start, now, velocity, acceleration))
+            reached = shaft + target - start - self._losing
+            self._losing = 0.0
+            self.shaft.drive(trapezoid(shaft, reached, now, velocity, acceleration))
 
     def brake(self, deceleration: float) -> None:
         """Slow down to rest."""
@@ -63,10 +66,8 @@ class Motor:
         self.stalled = True
 
     def slip(self, distance: float) -> None:
-        """Lose the steps of `distance`: the shaft jumps, the count does not."""
-        now = self._now()
-        self.shaft.drive(rest(self.shaft.motor(now), now))
-        self.shaft.drive(trapezoid(self.shaft.motor(now), self.shaft.motor(now) - distance, now, 1e6, 1e9))
+        """Lose the steps of `distance` on the next motion: the shaft stays behind by as much, the count does not."""
+        self._losing += distance
 
     def to_switch(self) -> float:
         """Return how far the shaft is from its switch."""
