@@ -314,9 +314,12 @@ async def test_every_fault_can_be_had_by_name() -> None:
         assert obey(emulators, "table slip sofa 1").endswith("no axis 'sofa': axes are slide, pan")
         before = table.shaft()
         assert obey(emulators, "table slip slide 3").endswith("steps are lost, and nobody notices")
+        motor = table.emulator.motors["slide"]
+        motor.go(10.0, 1e6, 1e9)  # steps are lost on a motion
         await asyncio.sleep(0.05)
-        assert table.shaft() == pytest.approx(before - 3)
-        assert table.emulator.motors["slide"].position == 0
+        assert table.shaft() == pytest.approx(before + 10 - 3)
+        assert motor.position == 10
+        motor.count_from(0.0)
         obey(emulators, "table mute")
         port.forget()
         port.send("?")
