@@ -11,7 +11,7 @@ from pydantic_core import to_json
 
 from daemon.api import problems
 from daemon.api.detection_document import DetectionDocument
-from daemon.api.sockets import first_of, send
+from daemon.api.sockets import first_of, left, send
 from daemon.live_view import Look
 from daemon.service import Service
 from drivers.errors import DriverError
@@ -62,12 +62,7 @@ async def follow_camera(socket: WebSocket, detect: bool = False) -> None:
     await socket.accept()
     asked = asyncio.Event()
     pictures = _messages(service, socket.app.state.packing, asked, socket.url.path, detect=detect)
-    await first_of(send(socket, service.streams.follow(pictures)), _listen(socket, asked))
-
-
-async def _listen(socket: WebSocket, asked: asyncio.Event) -> None:
-    while (await socket.receive())["type"] != "websocket.disconnect":
-        asked.set()
+    await first_of(send(socket, service.streams.follow(pictures)), left(socket, asked.set))
 
 
 async def _messages(

@@ -204,10 +204,12 @@ function unfinished(page, run, { end, quality }) {
   resume.disabled = toMove !== null;
   solve.disabled = toSolve !== null;
   const solved = end.calibration_id !== null;
+  // A cancelled run's error says no more than its state, unless its axes could not be seen to stand.
+  const why = end.error === "it was cancelled" ? "Somebody asked for it." : sentenceOf(end.error ?? end.state);
   const words = { failed: "The run failed", cancelled: "The run was cancelled", interrupted: "The run was interrupted" };
   return [
     h("h2", { id: "result-title" }, words[end.state]),
-    h("p", { role: "status" }, sentenceOf(end.error ?? end.state)),
+    h("p", { role: "status" }, why),
     solved && h("p", { class: "verdict", "data-judgement": quality?.judgement }, said(quality)),
     h("p", { class: "hint" }, "Taken up again, it homes all axes and goes on with the first sweep that is not finished. Its views can be solved as far as they go."),
     toMove !== null && h("p", { class: "reason" }, toMove),
