@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from drivers.axis import AxisController, AxisSpec
 from drivers.camera import CameraSource, CameraSpec
@@ -16,12 +16,6 @@ from drivers.clock import Clock
 
 if TYPE_CHECKING:
     from drivers.simulated.world import SimulatedWorld
-
-
-class DriverOptions(BaseModel):
-    """Base of a driver's option models: frozen, and an unknown key is an error."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from drivers.driver import DriverOptions
+from drivers.options import DriverOptions
 from drivers.quantities import PositiveDuration, written
 
 NodeId = Annotated[int, Field(ge=1, le=127)]

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from drivers.axis import AxisSpec
-from drivers.driver import DriverOptions
 from drivers.errors import OptionsError
+from drivers.options import DriverOptions
 from drivers.quantities import NUMBER, PositiveDuration, in_reading_unit, written
 
 Letter = Literal["X", "Y", "Z", "A", "B", "C"]

@@ -8,8 +8,9 @@ import numpy as np
 
 from drivers.camera import CameraSpec, Frame
 from drivers.clock import Clock
-from drivers.driver import DriverContext, DriverOptions
+from drivers.driver import DriverContext
 from drivers.errors import DeviceLostError, DeviceTimeoutError, OptionsError
+from drivers.options import DriverOptions
 from drivers.quantities import PositiveDuration, written
 from drivers.simulated.exposure import Exposure
 from drivers.simulated.faults import CameraFault

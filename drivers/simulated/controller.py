@@ -11,8 +11,9 @@ from pydantic import Field
 from drivers.axis import AxisSpec
 from drivers.cancellation import finish
 from drivers.clock import Clock
-from drivers.driver import DriverContext, DriverOptions
+from drivers.driver import DriverContext
 from drivers.errors import DriverError, OptionsError
+from drivers.options import DriverOptions
 from drivers.quantities import PositiveDuration, in_reading_unit, written
 from drivers.simulated.axis import SimulatedAxis
 from drivers.simulated.device import Device

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.driver import DriverOptions
+from drivers.options import DriverOptions
 
 AxisFault = Literal["stall", "hang"]
 """`stall`: the next motion ends half way. `hang`: the next motion never reports its end."""

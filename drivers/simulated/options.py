@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from drivers.driver import DriverOptions
+from drivers.options import DriverOptions
 from drivers.quantities import (
     LENGTH,
     NUMBER,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from drivers.driver import DriverOptions
+from drivers.options import DriverOptions
 from drivers.quantities import PositiveDuration, PositiveFrequency, written
 
 

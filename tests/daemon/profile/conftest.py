@@ -11,7 +11,7 @@ import pytest
 
 from daemon.profile import Profile, ProfileError, load_profile
 from drivers import registry
-from drivers.driver import DriverOptions
+from drivers.options import DriverOptions
 
 SMALL_RIG = Path(__file__).with_name("small-rig.toml")
 
