@@ -21,8 +21,7 @@ from daemon.live_picture import LivePicture
 from daemon.live_view import LiveView
 from daemon.operation.figures import Figures
 from daemon.operation.pulse import watch_loop
-from daemon.operation.readiness import StoreCheck
-from daemon.operation.rig_figures import RigFigures
+from daemon.operation.store_check import StoreCheck
 from daemon.pose import ActiveCalibration, Fallback, PoseService
 from daemon.procedure import RunManager
 from daemon.procedure.checklist import Checklist
@@ -57,7 +56,6 @@ class Service:
         self.view = LiveView(rig, self.pictures, self.sightings)
         self.streams = Streams()
         self.answers = AnswersGiven(store.answers)
-        self.figures.registry.register(RigFigures(self))
         self.started_at = datetime.now(UTC)
         self.version = version("activecam")
 
@@ -92,6 +90,17 @@ class Service:
         self.rig.latch.engage("the daemon is shutting down", for_good=True)
         await self.motions.close()
         self.leases.close()
+
+    async def missing(self) -> list[str]:
+        """Return sentences on what its work cannot do without.
+
+        These are lost devices, a store that takes nothing, and a calibration that cannot be used.
+        """
+        sentences = [device.lost for device in self.rig.snapshot.devices if device.lost is not None]
+        if self.fallback is not None:
+            sentences.append(self.fallback.sentence)
+        disk = await self.store_check.problem()
+        return sentences if disk is None else [*sentences, disk]
 
     @property
     def problems(self) -> list[str]:

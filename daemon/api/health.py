@@ -6,7 +6,6 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
 from daemon.api.dependencies import CallerDep, ServiceDep
-from daemon.operation.readiness import missing
 
 router = APIRouter(prefix="/health", tags=["rig"])
 
@@ -35,7 +34,7 @@ async def get_live(service: ServiceDep, response: Response) -> Live:
 @router.get("/ready", summary="Whether the daemon can be used", responses={503: {"model": Ready}})
 async def get_ready(service: ServiceDep, caller: CallerDep, response: Response) -> Ready:
     """Answer 503 while a device is lost, the store takes nothing, or the active calibration cannot be used."""
-    problems = await missing(service)
+    problems = await service.missing()
     response.status_code = 503 if problems else 200
     # Who shows no key, where one is asked for, is told no more than yes or no.
     return Ready(ready=not problems, problems=[] if caller is None else problems)

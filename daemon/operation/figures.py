@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector
 
 from daemon.procedure import RunEvent
 from daemon.store import RunState
@@ -64,7 +64,3 @@ class Figures:
             case "finished":
                 self._moves.clear()
                 self._runs.labels(event.state).inc()
-
-    def written(self) -> bytes:
-        """Return them all in the text exposition format, version 0.0.4."""
-        return generate_latest(self.registry)

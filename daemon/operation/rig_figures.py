@@ -1,15 +1,12 @@
 """What Prometheus is told of the rig and of the daemon as they are when it asks."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from daemon.service import Service
 from daemon.store import RunState
-
-if TYPE_CHECKING:
-    from daemon.service import Service
 
 Samples = Sequence[tuple[tuple[str, ...], float]]
 """The values of labels, and a figure."""
@@ -18,12 +15,8 @@ Samples = Sequence[tuple[tuple[str, ...], float]]
 class RigFigures(Collector):
     """The state of a service, as metrics."""
 
-    def __init__(self, service: "Service") -> None:
+    def __init__(self, service: Service) -> None:
         self._service = service
-
-    def describe(self) -> Iterable[Metric]:
-        """Name nothing in advance: registering would ask for the state of a rig that is not open yet."""
-        return ()
 
     def collect(self) -> Iterator[Metric]:
         """Yield the metrics as they are now."""

@@ -10,7 +10,7 @@ from typing import cast
 import httpx
 import pytest
 
-from daemon.operation import readiness
+from daemon.operation import store_check
 from daemon.rig import Devices, device_owner
 from daemon.service import Service
 from drivers.axis import AxisState
@@ -45,13 +45,13 @@ async def test_a_lost_device_is_in_the_way_of_use_not_of_life(
 async def test_a_store_that_takes_nothing_is_in_the_way(
     client: httpx.AsyncClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(readiness, "PATIENCE", 0.05)
-    monkeypatch.setattr(readiness, "KEPT", 0.0)
+    monkeypatch.setattr(store_check, "PATIENCE", 0.05)
+    monkeypatch.setattr(store_check, "KEPT", 0.0)
     with closing(sqlite3.connect(tmp_path / "data" / "activecam.db")) as other:
         other.execute("BEGIN IMMEDIATE")
         status, [sentence] = await ready(client)
         assert (status, "has taken nothing for 0.05 s" in sentence) == (503, True)
-    monkeypatch.setattr(readiness, "PATIENCE", 30.0)
+    monkeypatch.setattr(store_check, "PATIENCE", 30.0)
     assert await ready(client) == (200, [])
 
 
@@ -70,7 +70,7 @@ async def test_whoever_asks_how_often_the_store_is_written_to_once(
     assert await asyncio.gather(*(ready(client) for _ in range(20))) == [(200, [])] * 20
     assert await ready(client) == (200, [])
     assert written == 1
-    monkeypatch.setattr(readiness, "KEPT", 0.0)
+    monkeypatch.setattr(store_check, "KEPT", 0.0)
     assert await ready(client) == (200, [])
     assert written == 2
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from daemon.api import create_app, problems
 from daemon.api.rules import ROLES
+from daemon.operation.rig_figures import RigFigures
 from daemon.procedure import RunEvent
 from daemon.service import Service, running_service
 from tests.daemon.rigs import small_rig
@@ -144,7 +145,8 @@ def _printed(program: str, served: str) -> list[str]:
 
 async def test_every_figure_is_on_the_page(tmp_path: Path) -> None:
     async with running_service(small_rig(tmp_path), tmp_path / "data") as service:
-        families = {family.name: family.type for family in service.figures.registry.collect()}
+        figures = [*service.figures.registry.collect(), *RigFigures(service).collect()]
+        families = {family.name: family.type for family in figures}
     described = {
         name for row in table_below(page(PAGE), "### Figures") for name in re.findall(r"`(\w+)`", row[0])
     }

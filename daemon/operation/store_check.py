@@ -1,14 +1,11 @@
-"""Whether all is there that the daemon's work needs."""
+"""Whether the disk still takes what the daemon has to keep."""
 
 import asyncio
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from daemon.errors import StoreError
 from daemon.store import Store
-
-if TYPE_CHECKING:
-    from daemon.service import Service
 
 PATIENCE: Final = 2.0
 """Seconds that the disk may take."""
@@ -43,12 +40,3 @@ class StoreCheck:
         except TimeoutError:
             return f"the database has taken nothing for {PATIENCE:g} s: is the disk there?"
         return None
-
-
-async def missing(service: "Service") -> list[str]:
-    """Return sentences on devices that are lost, a store that takes nothing, and a calibration that cannot be used."""
-    sentences = [device.lost for device in service.rig.snapshot.devices if device.lost is not None]
-    if service.fallback is not None:
-        sentences.append(service.fallback.sentence)
-    disk = await service.store_check.problem()
-    return sentences if disk is None else [*sentences, disk]
