@@ -5,7 +5,7 @@ import contextlib
 import queue
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from daemon.access.keys import make_key
@@ -28,7 +28,7 @@ class Served:
     """The run that calibrated it."""
 
     def state(self) -> tuple[object, ...]:
-        """Return what requests change."""
+        """Return what requests change; not when keys were used, which is written down of those refused as well."""
 
         async def read() -> tuple[object, ...]:
             service = self.service
@@ -39,7 +39,7 @@ class Served:
                 await service.runs.list(),
                 service.poses.calibration_id,
                 await service.access.book.read(),
-                await service.store.keys.all(),
+                [replace(key, last_used_at=None) for key in await service.store.keys.all()],
             )
 
         return asyncio.run_coroutine_threadsafe(read(), self.loop).result(60)
