@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import product
 
 import cv2
 import numpy as np
@@ -21,6 +22,7 @@ MIDDLE, BESIDE_CORNER = 0.5, 0.15  # places in a square, in steps from corner to
 LEAST_CONTRAST = 0.15  # beside a corner, of that in the middle; disks have it in the middle alone
 LEAST_CHEQUERED = 0.9  # of the corners
 COPYS_ERROR = 1.5  # px of the copy
+FORESHORTENED = 2  # how much narrower for its length a board may look than it is, and be found in any strip
 STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.1)
 
 Search = Callable[[NDArray[np.uint8], tuple[int, int]], tuple[bool, cv2.typing.MatLike]]
@@ -86,7 +88,17 @@ def _by_quadrangles(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[
 
 
 def _by_sectors(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:
-    return cv2.findChessboardCornersSB(grey, pattern)
+    """Search, but a long strip in parts that overlap by half.
+
+    OpenCV turns what it searches in a square as wide as its longer side, and takes its time for all of that.
+    """
+    half = round(FORESHORTENED * min(grey.shape) * (max(pattern) + 1) / (min(pattern) + 1))
+    for top, left in product(*(range(0, max(side - half, 1), half) for side in grey.shape)):
+        part = grey[top : top + 2 * half, left : left + 2 * half]
+        found, corners = cv2.findChessboardCornersSB(part, pattern)
+        if found:
+            return True, corners + np.array([left, top], dtype=np.float32)
+    return False, np.empty(0, dtype=np.float32)
 
 
 def _thoroughly(grey: NDArray[np.uint8], pattern: tuple[int, int]) -> tuple[bool, cv2.typing.MatLike]:

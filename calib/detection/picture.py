@@ -98,12 +98,13 @@ def require_picture(image: NDArray[np.generic]) -> None:
 def copies(grey: NDArray[np.uint8], side: int) -> Iterator[tuple[NDArray[np.uint8], float]]:
     """Give a copy that is quick to search, at most `side` px long, and then the picture; each with its scale.
 
+    Of a strip whose copy would be too narrow to hold a target there is none.
     A pixel of the copy is the mean of a whole number of pixels, which takes a small part of the time of any other.
     """
     height, width = grey.shape
     times = -(-max(grey.shape) // side)
     small = width // times, height // times
-    if times > 1 and min(small) > 0:
+    if times > 1 and min(small) >= SMALLEST_SIDE:
         whole = grey[: small[1] * times, : small[0] * times]
         yield np.asarray(cv2.resize(whole, small, interpolation=cv2.INTER_AREA)), 1 / times
     yield grey, 1.0

@@ -92,10 +92,12 @@ def test_noise_is_no_chessboard_and_that_is_said_in_seconds():
 
 @pytest.mark.parametrize("target", ALL, ids=KINDS)
 @pytest.mark.parametrize("shape", [(32, 5000), (5000, 32), (33, 40000)], ids=str)
-def test_a_strip_is_a_picture_without_a_target(target, shape):
+def test_a_strip_is_a_picture_without_a_target_and_that_is_said_in_seconds(target, shape):
     stripes = np.where(np.indices(shape).sum(axis=0) // 20 % 2, 200, 30).astype(np.uint8)
+    start = process_time()
     with pytest.raises(DetectionError, match=r"is it in|is the target in it|whole"):
         detect(stripes, target)
+    assert process_time() - start < 5
 
 
 @pytest.mark.parametrize("target", ALL, ids=KINDS)
@@ -166,6 +168,14 @@ def test_a_target_in_a_long_strip_is_right_or_refused(target):
     picture = np.full((480, 6000), WALL, dtype=np.uint8)
     picture[:, 3000:3640] = drawn.picture
     found_or_refused(picture, target, [truth + np.array([3000, 0]) for truth in readings(drawn, target)])
+
+
+@pytest.mark.parametrize("left", [0, 333, 6100, 11840])
+def test_a_chessboard_is_found_wherever_it_is_in_a_strip(left):
+    drawn = drawn_once(ALL[2], size=(160, 120), tilt=(20, 10), fill=0.9, noise=1)
+    picture = np.full((120, 12000), WALL, dtype=np.uint8)
+    picture[:, left : left + 160] = drawn.picture
+    assert found_or_refused(picture, ALL[2], [drawn.points + np.array([left, 0])])
 
 
 @pytest.mark.parametrize("target", ALL, ids=KINDS)
