@@ -61,5 +61,5 @@ class Daemon:
 
     def forget_key(self, name: str) -> None:
         """Take a key back."""
-        command = [*ACTIVECAM, "key", "remove", name, "--data", str(self._data)]
+        command = [*ACTIVECAM, "key", "remove", name, "--data", str(self.data)]
         subprocess.run(command, check=True, capture_output=True)
