@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -9,6 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.daemons import Daemon
+from tests.daemon.rigs import write_profile
 
 Open = Callable[..., Page]
 expect.set_options(timeout=30_000)
@@ -23,6 +25,19 @@ def calibrate(api: httpx.Client) -> dict[str, Any]:
     done: dict[str, Any] = api.get(f"/runs/{run['id']}").json()
     assert done["state"] == "succeeded", done["error"]
     return done
+
+
+def quick_rig(folder: Path, *, keys: bool = False) -> Daemon:
+    """Return a daemon on a rig that is calibrated in some seconds."""
+    return Daemon(folder, str(write_profile(folder)), keys=keys)
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    daemon = quick_rig(tmp_path_factory.mktemp("rig"))
+    daemon.start()
+    yield daemon
+    daemon.stop()
 
 
 @pytest.fixture(scope="module")
@@ -179,7 +194,7 @@ def test_a_calibration_that_is_gone_is_said_so(daemon: Daemon, run: dict[str, An
 def test_a_viewer_sees_everything_and_changes_nothing(
     tmp_path_factory: pytest.TempPathFactory, open_page: Open
 ) -> None:
-    daemon = Daemon(tmp_path_factory.mktemp("asked"), keys=True)
+    daemon = quick_rig(tmp_path_factory.mktemp("asked"), keys=True)
     operator, viewer = daemon.key("operator"), daemon.key("viewer")
     daemon.start()
     try:
