@@ -121,7 +121,9 @@ async def test_a_motion_that_fails_names_its_axis(
     lease = {"X-Lease": (await client.post("/lease", json={"owner": "anna"})).json()["token"]}
     await client.post("/axes/slide/move", json={"target": 90}, headers=lease | {"X-Request-ID": "far"})
     await client.post("/axes/slide/stop")
-    await service.motions.close()
+    held = service.leases.current
+    assert held is not None
+    await service.motions.stopped(held)
     [failed] = [entry for entry in records(lines) if entry["logger"] == "daemon.client_motion"]
     assert (failed["axis"], failed["request"]) == ("slide", "far")
 
