@@ -1,10 +1,11 @@
 """Who may move: one lease on all motion, for a client as long as it renews it, or for a run until its end."""
 
 import asyncio
+import contextlib
 import hmac
 import logging
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
@@ -29,6 +30,8 @@ class LeaseDesk:
 
     def __init__(self) -> None:
         self._lease: Lease | None = None
+        self._promised: Lease | None = None
+        """A run's, while it is being begun."""
         self._expiry: asyncio.TimerHandle | None = None
         self._listeners: list[Callable[[Lease], None]] = []
 
@@ -48,6 +51,7 @@ class LeaseDesk:
         """
         expires_at = datetime.now(UTC) + timedelta(seconds=ttl)
         if self._lease is None:
+            self._require_unpromised()
             lease = Lease(secrets.token_urlsafe(18), owner, note, ttl, expires_at)
             logger.info("'%s' may move for %g s (%s)", owner, ttl, note or "no note")
         else:
@@ -62,6 +66,7 @@ class LeaseDesk:
         Raises LeaseHeldError when a run holds it.
         """
         former = self._lease
+        self._require_unpromised()
         if former is not None and former.ttl is None:
             raise LeaseHeldError(f"'{former.owner}' holds the motion lease until it is over: cancel it first")
         if former is not None:
@@ -69,17 +74,23 @@ class LeaseDesk:
             self._end(former)
         return self.acquire(owner, note, ttl), former
 
-    def hand_over(self, owner: str, note: str, token: str | None = None) -> Lease:
-        """Give a lease without an end to a run, in place of its starter's, which `token` shows.
+    @contextlib.contextmanager
+    def handing_over(self, owner: str, note: str, token: str | None = None) -> Generator[Lease]:
+        """Give a lease without an end to a run, in place of its starter's, which `token` shows, once the block is done.
 
+        Until then, and where the block raises, the starter's stays as it is, and nobody else gets one.
         Raises LeaseHeldError when somebody else than the starter holds it.
         """
+        self._require_unpromised()
         if self._lease is not None:
             self._require_holder(self._lease, token)
-            self._end(self._lease)
-        lease = Lease(secrets.token_urlsafe(18), owner, note, None, None)
+        lease = self._promised = Lease(secrets.token_urlsafe(18), owner, note, None, None)
+        try:
+            yield lease
+        finally:
+            self._promised = None
+        self.close()
         self._hold(lease)
-        return lease
 
     def require(self, token: str | None) -> Lease:
         """Return the lease that `token` shows.
@@ -125,6 +136,10 @@ class LeaseDesk:
             self._expiry = None
         for listener in self._listeners:
             listener(lease)
+
+    def _require_unpromised(self) -> None:
+        if self._promised is not None:
+            raise LeaseHeldError(f"'{self._promised.owner}' is about to hold the motion lease: wait for it")
 
     def _require_holder(self, lease: Lease, token: str | None) -> None:
         # Compared in constant time: a token is a key.

@@ -144,14 +144,14 @@ class RunManager(RunBook):
         token: str | None = None,
     ) -> RunRecord:
         """Start a run, under a lease of its own where it moves, once `take_up` has stored that it is under way."""
-        lease = self._leases.hand_over(f"run {record.id}", record.note, token) if assignment.moves else None
         stops = self._stops
-        try:
+        handing_over = (
+            self._leases.handing_over(f"run {record.id}", record.note, token)
+            if assignment.moves
+            else contextlib.nullcontext()
+        )
+        with handing_over as lease:
             log = await take_up()
-        except BaseException:
-            if lease is not None:
-                self._leases.release(lease.token)
-            raise
         if self._told is not None:
             log.listen(self._told)
         running = replace(record, state=RunState.RUNNING, ended_at=None, error=None)

@@ -1,6 +1,7 @@
 """One lease on all motion: taken, shown, renewed, handed over, and ended."""
 
 import asyncio
+import contextlib
 
 import pytest
 
@@ -73,20 +74,51 @@ async def test_it_can_be_given_back(desk: LeaseDesk, ended: list[Lease]) -> None
 
 
 async def test_a_run_takes_a_free_one_and_keeps_it(desk: LeaseDesk) -> None:
-    lease = desk.hand_over("run 1", "")
-    assert lease.expires_at is None
+    with desk.handing_over("run 1", "") as lease:
+        assert lease.expires_at is None
     with pytest.raises(LeaseHeldError, match="'run 1' holds the motion lease: "):
         desk.acquire("anna", "", 60)
 
 
 async def test_a_run_takes_its_starters(desk: LeaseDesk, ended: list[Lease]) -> None:
     mine = desk.acquire("anna", "", 60)
-    with pytest.raises(LeaseHeldError):
-        desk.hand_over("run 1", "")
-    desk.hand_over("run 1", "", mine.token)
+    with pytest.raises(LeaseHeldError), desk.handing_over("run 1", ""):
+        pytest.fail("anna holds it")
+    with desk.handing_over("run 1", "", mine.token):
+        assert desk.require(mine.token) == mine
     assert ended == [mine]
     with pytest.raises(LeaseHeldError):
         desk.require(mine.token)
+
+
+async def test_a_run_that_is_not_begun_after_all_leaves_its_starters(
+    desk: LeaseDesk, ended: list[Lease]
+) -> None:
+    mine = desk.acquire("anna", "", 60)
+    with pytest.raises(OSError, match="full"), desk.handing_over("run 1", "", mine.token):
+        raise OSError("the disk is full")
+    assert (desk.require(mine.token), ended) == (mine, [])
+
+
+async def test_nobody_gets_one_while_a_run_is_begun(desk: LeaseDesk, ended: list[Lease]) -> None:
+    mine = desk.acquire("anna", "", 0.01)
+    over = asyncio.Event()
+    desk.on_end(lambda _: over.set())
+    with desk.handing_over("run 1", "", mine.token) as lease:
+        await over.wait()
+        for asked in (desk.acquire, desk.take_over):
+            with pytest.raises(LeaseHeldError, match="'run 1' is about to hold the motion lease"):
+                asked("ben", "", 60)
+    assert (desk.current, ended) == (lease, [mine])
+
+
+async def test_its_starter_renews_it_while_a_run_is_begun(desk: LeaseDesk) -> None:
+    mine = desk.acquire("anna", "", 60)
+    with contextlib.suppress(ZeroDivisionError), desk.handing_over("run 1", "", mine.token):
+        desk.acquire("anna", "", 600, mine.token)
+        raise ZeroDivisionError
+    assert desk.require(mine.token).ttl == 600
+    desk.close()
 
 
 async def test_nothing_begins_under_one_that_is_over(service: Service) -> None:

@@ -15,6 +15,7 @@ from daemon.errors import (
     RunActiveError,
     RunStateError,
     StopLatchedError,
+    StoreError,
 )
 from daemon.procedure import RunEvent
 from daemon.procedure.event_log import read_events
@@ -120,6 +121,21 @@ async def test_a_run_that_cannot_start_leaves_no_trace(service: Service, devices
         await service.runs.start()
     assert await service.runs.list() == []
     assert service.leases.current is None
+
+
+async def test_a_run_whose_start_is_not_stored_leaves_its_starter_the_lease_and_the_motion(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def full(_: object) -> None:
+        raise StoreError("the disk is full")
+
+    monkeypatch.setattr(service.store, "add_run", full)
+    lease = service.leases.acquire("anna", "", 60)
+    jog = await service.motions.begin(lease, ["slide"], service.rig.jog("slide", 90.0))
+    with pytest.raises(StoreError):
+        await service.runs.start(token=lease.token)
+    assert service.leases.current == lease
+    await service.motions.ended(jog)
 
 
 async def test_a_paused_run_rests_between_two_views_and_goes_on(service: Service) -> None:
