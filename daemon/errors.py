@@ -119,7 +119,7 @@ class RunActiveError(RunError):
 
 
 class RunStateError(RunError):
-    """The run is over, or already in the state that was asked for."""
+    """The run is over, already in the state that was asked for, or takes no more views between which it could rest."""
 
 
 class ProfileChangedError(RunError):

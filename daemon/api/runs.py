@@ -152,7 +152,10 @@ async def get_run(run_id: RunId, service: ServiceDep) -> RunDocument:
     responses=answers(UnknownRunError, RunStateError, StoreError),
 )
 async def pause_run(run_id: RunId, service: ServiceDep) -> RunDocument:
-    """Let the run come to rest after the view in flight, as `paused`; it keeps its lease."""
+    """Let the run come to rest after the view in flight, as `paused`; it keeps its lease.
+
+    One that takes no more views, as where it solves, is refused with `run_state`: nothing of it rests.
+    """
     run = await service.runs.get(run_id)
     service.runs.pause(run_id)
     return RunDocument.of(run)

@@ -92,7 +92,7 @@ function mountAdvance(element, page, signal, run, positions) {
     element.hidden = over && state === "succeeded";
     controls.hidden = over;
     if (isPaused || over) asked = false;
-    pause.hidden = isPaused || phase === "solving";
+    pause.hidden = isPaused || !["homing", "measuring"].includes(phase); // where it computes, nothing rests
     pause.disabled = asked;
     setText(pause, asked ? "Pausing …" : "Pause");
     resume.hidden = !isPaused;

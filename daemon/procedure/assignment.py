@@ -34,6 +34,14 @@ class Assignment(Protocol):
     def activates(self) -> bool:
         """Whether poses are computed from what it finds, unless somebody decides otherwise."""
 
+    @property
+    def takes_views(self) -> bool:
+        """Whether it will come to a checkpoint again, where it may be paused."""
+
+    @property
+    def remedy(self) -> str:
+        """What to ask for once it was cut off, and what had cut it off is over."""
+
     async def work(self, log: EventLog, checkpoint: Checkpoint) -> Conclusion:
         """Do it; raises errors of the project's trees and OSError."""
 
@@ -52,8 +60,10 @@ class Calibrate:
 
     moves = True
     activates = True
+    remedy = "resume the run, or solve the views taken so far as they are"
 
     def __init__(self, rig: Rig, folder: Path, starts: Mapping[str, Sequence[float]] = NOWHERE_ELSE) -> None:
+        self.takes_views = True
         self._rig = rig
         self._folder = folder
         self._starts = starts
@@ -67,6 +77,8 @@ class Calibrate:
         if not writer.session.complete:
             survey = await finish(asyncio.to_thread(_survey))
             await survey(self._rig, writer, log, checkpoint).take()
+        await checkpoint()
+        self.takes_views = False
         return await conclude(self._folder, log)
 
     async def halt(self) -> None:
@@ -94,6 +106,8 @@ class Solve:
 
     moves = False
     activates = False
+    takes_views = False
+    remedy = "solve its views again"
 
     def __init__(self, before: RunRecord, folder: Path, left_out: Sequence[int] = ()) -> None:
         self._before = before

@@ -113,7 +113,7 @@ class RunManager(RunBook):
             logger.warning("run '%s' was interrupted: %s", run.id, run.error)
 
     def pause(self, run_id: str) -> None:
-        """Let a run come to rest after the view in flight; raises RunStateError."""
+        """Let a run that takes views come to rest after the one in flight; raises RunStateError."""
         self._require_active(run_id).pause()
 
     async def cancel(self, run_id: str) -> RunRecord:
@@ -129,8 +129,7 @@ class RunManager(RunBook):
             pass
         if self.active is not None:
             await self.active.end(
-                RunState.INTERRUPTED,
-                "the daemon was shut down: resume it, or solve the views taken so far as they are",
+                RunState.INTERRUPTED, f"the daemon was shut down: {self.active.assignment.remedy}"
             )
         if self._latest is not None:
             with contextlib.suppress(StoreError):  # the next daemon finds it unfinished then

@@ -29,13 +29,6 @@ logger = logging.getLogger(__name__)
 OnEnd = Callable[[CalibrationRecord | None, Calibration | None], None]
 
 
-def unwritten(error: OSError) -> str:
-    """Return why what a run has measured or found could not be written, and what to do."""
-    if error.errno in {errno.ENOSPC, errno.EDQUOT}:
-        return f"the disk is full: {error.filename} could not be written: make room, then resume the run"
-    return f"the session could not be written: {error.filename}: {error.strerror}"
-
-
 class Run:
     """A run under way: running -> (paused -> running)* -> succeeded, failed, cancelled or interrupted.
 
@@ -65,7 +58,12 @@ class Run:
         return self._task
 
     def pause(self) -> None:
-        """Let the run come to rest after the view in flight; raises RunStateError when it is to already."""
+        """Let the run come to rest after the view in flight.
+
+        Raises RunStateError when it is to already, and when it takes no more views.
+        """
+        if not self.assignment.takes_views:
+            raise RunStateError(f"run '{self.record.id}' only computes by now: wait for it, or cancel it")
         if self._gate.closed:
             raise RunStateError(f"run '{self.record.id}' is paused, or will be after the view in flight")
         self._gate.close()
@@ -109,7 +107,7 @@ class Run:
         except (DaemonError, DriverError, CalibError) as failure:
             state, error = RunState.FAILED, str(failure)
         except OSError as failure:
-            state, error = RunState.FAILED, unwritten(failure)
+            state, error = RunState.FAILED, self._unwritten(failure)
         except Exception as failure:
             logger.exception("run '%s' failed", self.record.id)
             state, error = RunState.FAILED, f"an error in the program, which its log describes: {failure!r}"
@@ -135,29 +133,30 @@ class Run:
                 await self.assignment.halt()
             except StandstillError as unsure:
                 error = f"{error}; {unconfirmed(unsure.reasons, str(error))}"
-        state, error = self.assignment.end(state, error)
+        ended, told = self.assignment.end(state, error)
         kept: CalibrationRecord | None = None
         try:
-            kept = None if conclusion is None else await self._keep(conclusion, state)
-            self.record = await self._store.change_run(self.record.id, state, error, calibration=kept)
+            kept = None if conclusion is None else await self._keep(conclusion, ended)
+            self.record = await self._store.change_run(self.record.id, ended, told, calibration=kept)
         except (DaemonError, OSError) as failure:
-            why = unwritten(failure) if isinstance(failure, OSError) else str(failure)
+            why = self._unwritten(failure) if isinstance(failure, OSError) else str(failure)
             unstored = f"its end could not be stored: {why}"
-            kept, error = None, unstored if error is None else f"{error}; {unstored}"
-            ended = RunState.FAILED if state is RunState.SUCCEEDED else state
-            self.record = replace(self.record, state=ended, error=error, ended_at=datetime.now(UTC))
+            ended, told = self.assignment.end(
+                RunState.FAILED if state is RunState.SUCCEEDED else state,
+                unstored if error is None else f"{error}; {unstored}",
+            )
+            kept = None
+            self.record = replace(self.record, state=ended, error=told, ended_at=datetime.now(UTC))
             self._stored = False
             with contextlib.suppress(StoreError):
                 await self.store_end()
         if kept is None or conclusion is None:
-            logger.warning("run '%s' %s: %s", self.record.id, self.record.state, error)
+            logger.warning("run '%s' %s: %s", self.record.id, self.record.state, told)
         else:
             solved = "succeeded" if kept.active else "was solved as it is"
             logger.info("run '%s' %s: %s", self.record.id, solved, conclusion.calibration.quality.verdict)
         self._on_end(kept, None if conclusion is None else conclusion.calibration)
-        self.log.add(
-            Finished(state=self.record.state, error=error, calibration_id=self.record.calibration_id)
-        )
+        self.log.add(Finished(state=self.record.state, error=told, calibration_id=self.record.calibration_id))
 
     async def _keep(self, conclusion: Conclusion, state: RunState) -> CalibrationRecord:
         """Write the calibration beside its session, and return the record that goes into the store.
@@ -176,3 +175,12 @@ class Run:
             document=calibration.model_dump_json(exclude_unset=True),
             verification=conclusion.verification_json(),
         )
+
+    def _unwritten(self, error: OSError) -> str:
+        """Return why what the run has measured or found could not be written, and what to do."""
+        if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+            return (
+                f"the disk is full: {error.filename} could not be written: "
+                f"make room, then {self.assignment.remedy}"
+            )
+        return f"the session could not be written: {error.filename}: {error.strerror}"

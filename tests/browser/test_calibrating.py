@@ -44,6 +44,18 @@ def tab_to(page: Page, name: str) -> None:
     pytest.fail(f"'{name}' is not reached")
 
 
+NOTE_PAUSES = """() => {
+    window.steered = window.paused = false;
+    const buttons = () => [...document.querySelectorAll("button")].filter((button) => button.checkVisibility());
+    const shown = (name) => buttons().some((button) => button.textContent === name);
+    new MutationObserver(() => {
+        window.steered ||= shown("Cancel");
+        window.paused ||= shown("Pause");
+    }).observe(document.body, { subtree: true, childList: true, attributes: true });
+}"""
+"""Note whether a run could be cancelled, and whether it could be paused."""
+
+
 def test_before_the_first_calibration_the_rig_in_3d_says_what_is_missing(
     daemon: Daemon, open_page: Open
 ) -> None:
@@ -159,8 +171,10 @@ def test_what_was_cut_off_is_solved_as_it_is(daemon: Daemon, open_page: Open, ap
     expect(page.get_by_role("button", name="Take it up again")).to_be_disabled()
     page.get_by_role("button", name="Acknowledge").click()
     expect(page.get_by_role("button", name="Take it up again")).to_be_enabled()
+    page.evaluate(NOTE_PAUSES)
     page.get_by_role("button", name="Solve it as it is").click()
     expect(page.get_by_role("link", name="Judge this calibration")).to_be_visible()
+    assert page.evaluate("[window.steered, window.paused]") == [True, False]
     # A run of the past, as after the daemon was started again, has its own address.
     daemon.stop()
     daemon.start()

@@ -177,3 +177,23 @@ async def test_a_succeeded_run_whose_solving_is_cut_off_has_still_succeeded(
     assert [stored.state for stored in await service.store.runs()] == [RunState.SUCCEEDED]
     await service.runs.cancel(run.id)
     assert (await service.runs.get(run.id)).state is RunState.SUCCEEDED
+
+
+async def test_what_a_shutdown_has_cut_off_is_asked_for_again(service: Service, run: RunRecord) -> None:
+    await service.runs.solve(run.id)
+    await service.runs.close()
+    cut_off = await service.runs.get(run.id)
+    assert cut_off.state is RunState.SUCCEEDED
+    assert cut_off.error == f"{UNSOLVED}the daemon was shut down: solve its views again"
+
+
+async def test_a_succeeded_run_that_the_disk_does_not_take_again_has_still_succeeded(
+    service: Service, run: RunRecord
+) -> None:
+    (service.store.session_folder(run) / ".calibration.json.tmp").symlink_to("/dev/full")
+    unsolved, events = await finish(service, await service.runs.solve(run.id))
+    assert (unsolved.state, unsolved.calibration_id) == (RunState.SUCCEEDED, run.calibration_id)
+    assert unsolved == await service.store.run(run.id)
+    assert (unsolved.error or "").startswith(f"{UNSOLVED}its end could not be stored: the disk is full: ")
+    assert (unsolved.error or "").endswith(": make room, then solve its views again")
+    assert events[-1].error == unsolved.error

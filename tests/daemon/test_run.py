@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import cast
 
 import cv2
+import httpx
 import numpy as np
 import pytest
 
@@ -180,3 +181,35 @@ async def test_a_paused_run_can_be_cancelled(service: Service) -> None:
         if event.type == "state" and event.state is RunState.PAUSED:
             break
     assert (await service.runs.cancel(run.id)).state is RunState.CANCELLED
+
+
+async def test_a_run_that_is_paused_in_its_last_view_rests_before_it_computes(service: Service) -> None:
+    run = await service.runs.start()
+    seen: list[RunEvent] = []
+    async for event in service.runs.events(run.id):
+        seen.append(event)
+        if event.type == "moving" and event.position == event.of:
+            service.runs.pause(run.id)
+        if event.type == "state" and event.state is RunState.PAUSED:
+            assert len(of(seen, "view")) == 10
+            assert not of(seen, "solving")
+            await service.runs.resume(run.id)
+    assert [event.state for event in of(seen, "state")] == ["running", "paused", "running"]
+    assert (await service.runs.get(run.id)).state is RunState.SUCCEEDED
+
+
+async def test_a_run_that_computes_is_not_paused(service: Service, client: httpx.AsyncClient) -> None:
+    async def refused() -> None:
+        answer = await client.post(f"/runs/{run.id}/pause")
+        assert (answer.status_code, answer.json()["code"]) == (409, "run_state")
+        assert answer.json()["detail"] == f"run '{run.id}' only computes by now: wait for it, or cancel it"
+
+    run = await service.runs.start()
+    async for event in service.runs.events(run.id):
+        if event.type == "solving":
+            await refused()
+            break
+    await service.runs.wait(run.id)
+    await service.runs.solve(run.id)
+    await refused()
+    await service.runs.wait(run.id)
