@@ -19,7 +19,8 @@ from calib.nominal import nominal_solution
 from calib.observations import Observation
 from calib.projection import projected
 from calib.residuals import misfits, read_as_predicted
-from calib.session import Intrinsics, Session
+from calib.second_look import Predict
+from calib.session import Intrinsics, Session, View
 from calib.targets import Target, target_points
 from calib.unfinished import part_about
 
@@ -59,6 +60,16 @@ def predicted_by_calibration(
     if known is not None:
         variance += float(np.trace(known, axis1=-2, axis2=-1).max())
     return _prediction(points, ids, pixels, SURE * float(np.sqrt(variance)))
+
+
+def by_calibration(calibration: Calibration, session: Session) -> Predict:
+    """Return what tells a second look where `calibration` has the target in a view of `session`."""
+
+    def predict(_: Sequence[Observation], view: View) -> Prediction:
+        camera = session.cameras[session.camera_index(view)].name
+        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
+
+    return predict
 
 
 def predicted_by_views(

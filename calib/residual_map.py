@@ -1,19 +1,17 @@
 """Every point of every view, and by how much it misses: what a person looks for a pattern in."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.calibration import Calibration
-from calib.detection import Prediction
 from calib.errors import CalibError
-from calib.observations import Observation, Observed
-from calib.prediction import predicted_by_calibration
+from calib.observations import Observed
+from calib.prediction import by_calibration
 from calib.residuals import view_residuals
 from calib.second_look import second_look
-from calib.session import Session, View
+from calib.session import Session
 from calib.unfinished import finished_part
 
 Array = NDArray[np.float64]
@@ -52,12 +50,7 @@ def residual_map(calibration: Calibration, session: Session, observed: Observed)
         {numbers[place]: why for place, why in observed.unseen.items() if place in numbers},
         {},
     )
-
-    def predict(_: Sequence[Observation], view: View) -> Prediction:
-        camera = part.session.cameras[part.session.camera_index(view)].name
-        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
-
-    seen = second_look(part.session, own, predict).observations
+    seen = second_look(part.session, own, by_calibration(calibration, part.session)).observations
     return [
         ViewMisses(part.places[residual.view], residual.ids, residual.places, residual.pixels)
         for residual in view_residuals(calibration, part.session, seen)

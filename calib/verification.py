@@ -14,13 +14,12 @@ from pydantic import TypeAdapter
 
 from calib.calibration import Calibration
 from calib.closed_form import PoseViews
-from calib.detection import Prediction
 from calib.errors import FormatError
-from calib.observations import Observation, Observed, Progress, observe
-from calib.prediction import predicted_by_calibration
+from calib.observations import Observed, Progress, observe
+from calib.prediction import by_calibration
 from calib.residuals import ViewResidual, view_residuals
 from calib.second_look import second_look
-from calib.session import JointKind, Session, View
+from calib.session import JointKind, Session
 from calib.sweeps import sweep_labels
 from calib.transforms import inverse, rotation_log
 from calib.units import nominal_scale
@@ -127,12 +126,8 @@ def compare(
     Raises as `verify` does.
     """
     _require_same_rig(calibration, session)
-
-    def predict(_: Sequence[Observation], view: View) -> Prediction:
-        camera = session.cameras[session.camera_index(view)].name
-        return predicted_by_calibration(calibration, session.target, view.readings, camera, view.approached)
-
-    observed = second_look(session, observe(session, progress, views), predict, progress)
+    seen, predict = observe(session, progress, views), by_calibration(calibration, session)
+    observed = second_look(session, seen, predict, progress)
     return observed, view_residuals(calibration, session, observed.observations, measure_pose=True)
 
 
