@@ -21,7 +21,8 @@ data flows through them:
     stated_corrections, corrections_in_words     what they are, said;  stated_quality  and how good it is
     links, dh, document          D-H and base read off the screws, and all written down: calibration
     pose_covariance, projection, dh_covariance   how sure a pose is, where a point is seen, and a D-H parameter
-    residuals, quality, verdict, verification  is it good?  own_fit, residual_map  what to look at where it is not
+    residuals, quality, verdict, verification  is it good?  own_fit, residual_map  what to look at where it is not;
+    as_solved                    a session's readings as the fit found them
     scene, comparison            the rig in 3-D; two calibrations of it side by side
     paper, paper_tables, stated_parameters     the paper's tables, ours beside them, and all parameters in a row
     solver                       from a session to a calibration

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.as_solved import as_solved
 from calib.calibration import Calibration
 from calib.errors import CalibError
 from calib.observations import Observed
@@ -35,8 +36,9 @@ class ViewMisses:
 def residual_map(calibration: Calibration, session: Session, observed: Observed) -> list[ViewMisses]:
     """Return what each view of `session`, which `calibration` was solved from, is off by; `observed` is what it shows.
 
-    A target that was not found is looked for where the calibration has it. Views that carry poses have no points.
-    Raises CalibError where the session has gone on since then, and ImageError for a missing picture.
+    Readings are those that the fit found, where a joint slipped. A target that was not found is looked for where the
+    calibration has it. Views that carry poses have no points. Raises CalibError where the session has gone on since
+    then, and ImageError for a missing picture.
     """
     part = finished_part(session)
     solved = [joint.name for joint in calibration.joints]
@@ -50,9 +52,10 @@ def residual_map(calibration: Calibration, session: Session, observed: Observed)
         {numbers[place]: why for place, why in observed.unseen.items() if place in numbers},
         {},
     )
-    seen = second_look(part.session, own, by_calibration(calibration, part.session)).observations
+    read = as_solved(calibration, part.session, part.places)
+    seen = second_look(read, own, by_calibration(calibration, read)).observations
     return [
         ViewMisses(part.places[residual.view], residual.ids, residual.places, residual.pixels)
-        for residual in view_residuals(calibration, part.session, seen)
+        for residual in view_residuals(calibration, read, seen)
         if residual.pixels is not None
     ]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from calib.advice import weakness_in_words
+from calib.as_solved import read_by_fit, stating_readings
 from calib.calibration import Calibration
 from calib.corrections_in_words import FLAT, corrections_in_words, unused_warp_in_words
 from calib.document import Method, document
@@ -18,7 +19,7 @@ from calib.prediction import predicted_by_views
 from calib.quality import judged
 from calib.second_look import second_look
 from calib.session import Session
-from calib.slips import as_it_stood, slips_in_words
+from calib.slips import slips_in_words
 from calib.solution import Solution
 from calib.stated_quality import Quality
 from calib.targets import target_points
@@ -74,15 +75,13 @@ def solve(
     warnings += [*left_out_in_words(solution), *unused_warp_in_words(solution.unused_warp, points)]
     warnings += observed.warnings(session)
     calibration = document(session, method, solution, Quality())
-    known = session.approached_from(solution.sides)
-    if solution.slips:
-        known = known.read_as(as_it_stood(known.readings(), solution.slips))
+    known = read_by_fit(session, solution)
     quality = judged(calibration, known, observed.observations, solution, warnings)
+    quality = stating_readings(quality, session, solution, part.places)
     corrected = corrections_in_words(calibration.corrections, session.joints, points)
     if target_warp and not solution.warp:
         corrected.append(FLAT)
-    views = [view.model_copy(update={"view": part.places[view.view]}) for view in quality.views]
-    quality = quality.model_copy(update={"corrections": corrected, "views": views})
+    quality = quality.model_copy(update={"corrections": corrected})
     return calibration.model_copy(update={"quality": quality})
 
 

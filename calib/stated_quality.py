@@ -22,6 +22,17 @@ class ViewQuality(Document):
     held_out_rotation_rad: Number | None = None
     set_aside: bool = False
     """Whether it was left out of the fit because it does not agree with the others."""
+    approached: list[Literal[-1, 0, 1]] | None = None
+    """From which side each joint came to its reading, where the fit found out what the session does not say."""
+
+
+class Slip(Document):
+    """A joint lost steps on its way to a view: from there on it stood `size` beyond its readings, in their unit."""
+
+    joint: str
+    view: int
+    size: Number
+    std: Number
 
 
 class JointQuality(Document):
@@ -91,4 +102,6 @@ class Quality(Document):
     coverage: list[CameraCoverage] = Field(default_factory=list)
     joints: list[JointQuality] = Field(default_factory=list)
     views: list[ViewQuality] = Field(default_factory=list)
+    slips: list[Slip] = Field(default_factory=list)
+    """Of the session's joints, in the order of its views; every figure is of the readings without them."""
     warnings: list[str] = Field(default_factory=list)

@@ -68,13 +68,14 @@ def _solve(folder: Path, left_out: Sequence[int], tell: Callable[[str], None]) -
 
 def _verify(calibration: Calibration, folder: Path, left_out: Sequence[int]) -> dict[str, Any] | None:
     from calib import verify
+    from calib.as_solved import as_solved
 
     session = load_session(folder).leaving_out(left_out)
     if not any(view.use == "verify" for view in session.views):
         return None  # views of the fit would flatter it
     if not _of_all_joints(calibration, session):
         return None  # it cannot tell where the camera was
-    return asdict(verify(calibration, session))
+    return asdict(verify(calibration, as_solved(calibration, session)))
 
 
 def _of_all_joints(calibration: Calibration, session: Session) -> bool:

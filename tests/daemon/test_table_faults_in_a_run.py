@@ -4,6 +4,7 @@ Lost steps and a motor that stands are no faults here: the table counts what it 
 pictures can: the calibration is judged poor then, or there is none.
 """
 
+import json
 import re
 from pathlib import Path
 
@@ -51,3 +52,14 @@ async def test_steps_that_the_table_loses_are_found_in_the_pictures(tmp_path: Pa
         slip = re.search(r"joint 'slide' slipped by (\S+) mm", str(summary.verdict))
         assert slip is not None, summary.verdict
         assert float(slip[1]) == pytest.approx(-1, abs=0.01)
+        # What it is judged by knows of it: the residuals that are drawn, and the held-out views. Those that show a
+        # part of the target are looked at once more where the calibration has it, and may be off by a little less.
+        stored = await course.service.store.calibration(summary.id)
+        quality = stored.read().quality
+        stated = {view.view: view.rms_px for view in quality.views}
+        residuals = await course.service.judge.residuals(summary.id)
+        whole = {view.view: view.rms_px for view in residuals if len(view.ids) == 20}
+        assert len(whole) >= 16
+        assert whole == pytest.approx({number: stated[number] for number in whole}, rel=1e-6)
+        verification = json.loads(stored.verification or "")
+        assert verification["rms_px"] == pytest.approx(quality.held_out_rms_px, rel=0.2)

@@ -72,6 +72,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "### A camera's coverage": stated_quality.CameraCoverage,
     "### A mean and a maximum": stated_quality.MeanAndMax,
     "### A view's quality": stated_quality.ViewQuality,
+    "### A slip": stated_quality.Slip,
 }
 
 

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 
 from calib import Calibration, load_session, verify
+from calib.as_solved import as_solved
 from calib.errors import CalibError
 from calib.observations import observe
 from calib.residual_map import ViewMisses, residual_map
@@ -180,7 +181,7 @@ def _verification(subject: Subject, session: Session | None) -> Verification | N
     if session is None or all(view.use != "verify" for view in session.views):
         return None
     try:
-        return verify(subject.calibration, session)
+        return verify(subject.calibration, as_solved(subject.calibration, session))
     except CalibError:
         return None
 
