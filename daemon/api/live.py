@@ -5,7 +5,7 @@ import contextlib
 from collections.abc import AsyncGenerator, AsyncIterator
 from typing import Any, Final, Literal
 
-from fastapi import APIRouter, WebSocket
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect, status
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 
@@ -32,6 +32,12 @@ ROUTES: Final = {
 }
 """Which request each command stands for. What a command has beside its own keys is the request's body."""
 
+STOPS: Final = frozenset({"stop", "stop_axis"})
+MOST_COMMANDS: Final = 64
+"""Commands of a client that may wait for their answers. Beyond them none but STOPS is carried out."""
+MOST_ANSWERS: Final = 1024
+"""Answers, refusals among them, that a client may leave waiting before it is let go, and what it moves is stopped."""
+
 
 class Command(BaseModel):
     """What a client wants; `id` comes back with the answer."""
@@ -47,7 +53,8 @@ class Command(BaseModel):
 async def follow_live(socket: WebSocket) -> None:
     """Tell the state whenever it changes, and events of runs; carry out commands, each as soon as it comes.
 
-    A lease that was taken over this socket ends with it, and so do the motions under it.
+    A lease that was taken over this socket ends with it, and so do the motions under it. Who sends and sends and
+    takes no answers is let go.
     """
     service: Service = socket.app.state.service
     states: LiveState = socket.app.state.live_state
@@ -62,6 +69,9 @@ async def follow_live(socket: WebSocket) -> None:
         )
     finally:
         await client.leave()
+    if client.floods:
+        with contextlib.suppress(WebSocketDisconnect):
+            await socket.close(status.WS_1008_POLICY_VIOLATION, "too many commands wait for their answers")
 
 
 class Client:
@@ -75,6 +85,12 @@ class Client:
         self._token: str | None = None
         self._commands: set[asyncio.Task[None]] = set()
         self._answered: asyncio.Queue[str] = asyncio.Queue()
+        self._waiting = 0  # commands whose answers are not sent yet
+
+    @property
+    def floods(self) -> bool:
+        """Whether more answers wait than a client can want."""
+        return self._waiting > MOST_ANSWERS
 
     async def states(self, states: LiveState) -> AsyncIterator[str]:
         """Yield each state with who this client is, and whether it holds the lease."""
@@ -87,11 +103,14 @@ class Client:
         """Yield what each command has come to, in the order in which they do."""
         while True:
             yield await self._answered.get()
+            self._waiting -= 1
 
     async def obey(self) -> None:
-        """Begin each command as it comes, whatever the ones before it do, until the client has gone."""
-        while (message := await self._socket.receive())["type"] != "websocket.disconnect":
-            task = asyncio.create_task(self._carry_out(message.get("text") or message.get("bytes") or b""))
+        """Begin each command as it comes, whatever the ones before it do, until the client has gone, or floods."""
+        while not self.floods and (message := await self._socket.receive())["type"] != "websocket.disconnect":
+            self._waiting += 1
+            text = message.get("text") or message.get("bytes") or b""
+            task = asyncio.create_task(self._carry_out(text, stops_only=self._waiting > MOST_COMMANDS))
             self._commands.add(task)
             task.add_done_callback(self._commands.discard)
 
@@ -101,24 +120,31 @@ class Client:
         await asyncio.gather(*self._commands, return_exceptions=True)
         self._release()
 
-    async def _carry_out(self, text: str | bytes) -> None:
-        answer = await self._answer(text)
+    async def _carry_out(self, text: str | bytes, *, stops_only: bool) -> None:
+        answer = await self._answer(text, stops_only)
         self._answered.put_nowait(to_json({"type": "answer"} | answer).decode())
 
-    async def _answer(self, text: str | bytes) -> dict[str, Any]:
+    async def _answer(self, text: str | bytes, stops_only: bool) -> dict[str, Any]:
+        address = self._socket.url.path
         try:
             command = Command.model_validate_json(text)
         except ValidationError as error:
-            problem = problems.invalid(error.errors(), self._socket.url.path)
+            problem = problems.invalid(error.errors(), address)
             return {"id": None, "status": problem["status"], "problem": problem}
+        if stops_only and command.do not in STOPS:
+            detail = (
+                f"{MOST_COMMANDS} commands wait for their answers: wait, only stops are carried out meanwhile"
+            )
+            problem = problems.document(problems.TOO_MANY_COMMANDS, detail, address)
+            return {"id": command.id, "status": problem["status"], "problem": problem}
         method, route = ROUTES[command.do]
         body = to_json(command.model_extra)
-        status, document = await self._relay.ask(method, route.format(axis=command.axis), body, self._token)
-        if status >= 400:
-            return {"id": command.id, "status": status, "problem": document}
+        code, document = await self._relay.ask(method, route.format(axis=command.axis), body, self._token)
+        if code >= 400:
+            return {"id": command.id, "status": code, "problem": document}
         if command.do == "lease":
             self._token = document["token"]
-        return {"id": command.id, "status": status, "body": document}
+        return {"id": command.id, "status": code, "body": document}
 
     def _release(self) -> None:
         if self._token is not None:

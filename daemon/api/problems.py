@@ -89,6 +89,7 @@ HTTP_PROBLEMS: Final = {
 BODY_TOO_LARGE: Final = Kind(413, "body_too_large", "The request's body is too large")
 FOREIGN_PAGE: Final = Kind(403, "foreign_page", "A page from elsewhere may not do this")
 HOST_UNKNOWN: Final = Kind(421, "host_unknown", "This daemon is not known by that name")
+TOO_MANY_COMMANDS: Final = Kind(429, "too_many_commands", "Too many commands wait for their answers")
 INTERNAL: Final = Kind(500, "internal_error", "The daemon has failed")
 
 

@@ -1,13 +1,17 @@
 """The page's socket: what the rig does, as it does it, and commands that are requests like any other."""
 
 import asyncio
+import contextlib
 import json
+from collections.abc import AsyncGenerator
 from typing import Any
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 
 from daemon.api import live_state
+from daemon.api.live import MOST_ANSWERS, MOST_COMMANDS, Client
 from daemon.api.live_state import LiveState
 from daemon.client_motion import ClientMotions
 from daemon.service import Service
@@ -114,6 +118,53 @@ async def test_a_stop_waits_for_no_command_before_it(
         late = await message(socket, "answer")
         assert (late["id"], late["problem"]["code"]) == ("late", "stop_latched")
         assert (await ask(socket, do="acknowledge"))["body"]["latched"] is False
+
+
+async def test_a_client_whose_commands_pile_up_may_still_stop(
+    service: Service, live: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin, held = ClientMotions.begin, asyncio.Event()
+
+    async def begin_late(*arguments: Any) -> Any:
+        await held.wait()
+        return await begin(*arguments)
+
+    monkeypatch.setattr(ClientMotions, "begin", begin_late)
+    jog = {"do": "jog", "axis": "slide", "distance": 5}
+    async with connect(live) as socket:
+        await ask(socket, do="lease", owner="anna")
+        for number in range(MOST_COMMANDS):
+            await socket.send(json.dumps({"id": number} | jog))
+        refused = await ask(socket, id="one more", **jog)
+        assert (refused["id"], refused["status"]) == ("one more", 429)
+        assert refused["problem"]["code"] == "too_many_commands"
+        assert (await ask(socket, do="stop_axis", axis="slide"))["status"] == 200
+        assert (await ask(socket, do="stop"))["body"]["latched"] is True
+        held.set()
+        late = [await message(socket, "answer") for _ in range(MOST_COMMANDS)]
+        assert {each["id"] for each in late} == set(range(MOST_COMMANDS))
+        assert (await ask(socket, do="acknowledge"))["body"]["latched"] is False
+
+
+async def test_who_takes_no_answers_is_let_go_and_moves_nothing_any_more(
+    service: Service, live: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Client, "answers", _untaken)
+    async with connect(live) as socket:
+        await socket.send(json.dumps({"id": 0, "do": "lease", "owner": "anna"}))
+        await state(socket, lambda told: told["you"]["holds_lease"])
+        with contextlib.suppress(ConnectionClosed):
+            for number in range(2 * MOST_ANSWERS):
+                await socket.send(json.dumps({"id": number, "do": "acknowledge"}))
+        await socket.wait_closed()
+    assert socket.close_code == 1008
+    assert service.leases.current is None
+
+
+async def _untaken(client: Client) -> AsyncGenerator[str]:
+    """Yield nothing: a client that reads nothing, before whose network is full."""
+    await asyncio.Event().wait()
+    yield ""
 
 
 async def test_what_is_no_command_is_refused_in_words(live: str) -> None:

@@ -89,6 +89,7 @@ def test_every_problem_is_on_the_page_with_its_status() -> None:
         problems.INVALID,
         problems.INTERNAL,
         problems.BODY_TOO_LARGE,
+        problems.TOO_MANY_COMMANDS,
         problems.FOREIGN_PAGE,
         problems.HOST_UNKNOWN,
     ]
