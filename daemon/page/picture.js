@@ -74,6 +74,7 @@ export function mountPicture(element, page, signal) {
     if (state === null) {
       feed.close();
       arrivals.length = 0;
+      setText(rate, "");
       show(null);
       health.say("gone", "There is no picture without a connection.", []);
     } else {
@@ -158,13 +159,14 @@ class View {
       delete canvas.dataset.points;
       return;
     }
-    const { width, height, detection } = this.#head;
+    const { width, height, detection, sequence } = this.#head;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const context = canvas.getContext("2d");
     context.drawImage(this.#bitmap, 0, 0);
     this.#coverage.draw(context, width, height);
     const points = this.#marked() ? (detection?.pixels ?? []) : [];
     canvas.dataset.points = points.length;
+    canvas.dataset.sequence = sequence;
     drawPoints(context, points, width / (canvas.clientWidth || width));
   }
 }

@@ -24,6 +24,8 @@ class Daemon:
         self._port = 0
         self._process: subprocess.Popen[str] | None = None
         self.address = ""
+        self.keys: dict[str, str] = {}
+        """Those that were made, by role."""
 
     def start(self) -> None:
         """Serve, at the address of before if there was one, and return when requests are answered."""
@@ -49,17 +51,15 @@ class Daemon:
         self._process.communicate()
 
     def stop(self) -> None:
-        """End it as its user would."""
+        """End it as its user would, where it runs."""
         assert self._process is not None
+        if not self.running:
+            return
         self._process.send_signal(signal.SIGTERM)
         self._process.communicate()
 
-    def key(self, role: str) -> str:
-        """Return a new key of `role`."""
+    def make_key(self, role: str) -> None:
+        """Make a key of `role`, which a daemon that runs knows of within a second."""
         command = [*ACTIVECAM, "key", "add", role, "--role", role, "--data", str(self.data)]
-        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-
-    def forget_key(self, name: str) -> None:
-        """Take a key back."""
-        command = [*ACTIVECAM, "key", "remove", name, "--data", str(self.data)]
-        subprocess.run(command, check=True, capture_output=True)
+        made = subprocess.run(command, check=True, capture_output=True, text=True)
+        self.keys[role] = made.stdout.strip()

@@ -47,8 +47,21 @@ def homed(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     for axis, reading in (("slide", "620"), ("pan", "-4.5")):
         page.get_by_label(f"Go to, {axis}").fill(reading)
         page.get_by_label(f"Go to, {axis}").press("Enter")
-    expect(page.locator("#connection")).to_have_text("Connected")
+        expect(page.get_by_role("article", name=f"Axis {axis}").locator(".position")).to_contain_text(
+            reading.replace("-", "−")
+        )
+    _let_the_picture_follow(page)
     page.get_by_label("Go to, pan").focus()
+
+
+def _let_the_picture_follow(page: Page) -> None:
+    """Return when a picture is shown that was taken from now on."""
+    canvas = page.locator(".picture canvas")
+    before = canvas.get_attribute("data-sequence") or ""
+    # The next one may have been on its way already.
+    for _ in range(2):
+        expect(canvas).not_to_have_attribute("data-sequence", before)
+        before = canvas.get_attribute("data-sequence") or ""
 
 
 def covered(page: Page, daemon: Daemon, api: httpx.Client) -> None:
@@ -145,6 +158,13 @@ def gone(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     expect(page.get_by_role("alert")).to_contain_text("The daemon does not answer")
 
 
+def in_3d(page: Page, daemon: Daemon, api: httpx.Client) -> None:
+    homed(page, daemon, api)
+    page.get_by_text("As a table").click()
+    expect(page.get_by_role("row", name="camera main")).to_be_visible()
+    _scroll_to(page, "Rig in 3-D")
+
+
 def asked_for_a_key(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     page.goto(daemon.address)
     expect(page.get_by_label("Key")).to_be_focused()
@@ -152,17 +172,16 @@ def asked_for_a_key(page: Page, daemon: Daemon, api: httpx.Client) -> None:
 
 def seen_by_a_viewer(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     asked_for_a_key(page, daemon, api)
-    page.get_by_label("Key").fill(daemon.key("viewer"))
-    page.wait_for_timeout(1000)  # in which the daemon learns of the key
+    page.get_by_label("Key").fill(daemon.keys["viewer"])
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_text("it sees everything and changes nothing")).to_be_visible()
     expect(page.locator(".rate")).to_contain_text("pictures/s")
-    daemon.forget_key("viewer")
 
 
 STATES: Final[dict[str, State]] = {
     "rig": ready,
     "rig-homed": homed,
+    "rig-3d": in_3d,
     "rig-coverage": covered,
     "rig-held": held_by_another,
     "rig-stopped": stopped,
@@ -202,8 +221,10 @@ def main(folder: Path, wanted: Collection[str]) -> None:
         daemon.stop()
     with TemporaryDirectory() as data, chromium() as browser:
         daemon = Daemon(Path(data), "paper-table", keys=True)
-        admin = {"Authorization": f"Bearer {daemon.key('admin')}"}
-        daemon.start()
+        for role in ("viewer", "admin"):
+            daemon.make_key(role)
+        admin = {"Authorization": f"Bearer {daemon.keys['admin']}"}
+        daemon.start()  # which knows of them from its beginning
         with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60, headers=admin) as api:
             for name, state in _chosen(GUARDED, wanted):
                 _take(browser, daemon, api, state, folder / name)

@@ -11,13 +11,13 @@ Open = Callable[..., Page]
 
 
 @pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Daemon, dict[str, str]]]:
-    """A daemon that asks for keys, and one of each role."""
-    folder = tmp_path_factory.mktemp("guarded")
-    daemon = Daemon(folder, keys=True)
-    keys = {role: daemon.key(role) for role in ("viewer", "operator")}
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon that asks for keys, and has one of each role that uses the page."""
+    daemon = Daemon(tmp_path_factory.mktemp("guarded"), keys=True)
+    for role in ("viewer", "operator"):
+        daemon.make_key(role)
     daemon.start()
-    yield daemon, keys
+    yield daemon
     daemon.stop()
 
 
@@ -26,14 +26,11 @@ def sign_in(page: Page, key: str) -> None:
     page.get_by_role("button", name="Sign in").click()
 
 
-def test_an_operator_signs_in_moves_and_signs_out(
-    guarded: tuple[Daemon, dict[str, str]], open_page: Open
-) -> None:
-    daemon, keys = guarded
-    page = open_page(daemon.address)
+def test_an_operator_signs_in_moves_and_signs_out(guarded: Daemon, open_page: Open) -> None:
+    page = open_page(guarded.address)
     sign_in(page, "activecam_wrong")
     expect(page.get_by_text("this key is not known here")).to_be_visible()
-    sign_in(page, keys["operator"])
+    sign_in(page, guarded.keys["operator"])
     expect(page.locator("#lease")).to_contain_text("operator, operator")
     page.get_by_role("button", name="Home pan", exact=True).click()
     expect(page.get_by_role("article", name="Axis pan").locator(".condition")).to_have_text("homed")
@@ -44,12 +41,9 @@ def test_an_operator_signs_in_moves_and_signs_out(
     expect(page.get_by_label("Key")).to_be_visible()
 
 
-def test_a_viewer_sees_everything_and_moves_nothing(
-    guarded: tuple[Daemon, dict[str, str]], open_page: Open
-) -> None:
-    daemon, keys = guarded
-    page = open_page(daemon.address)
-    sign_in(page, keys["viewer"])
+def test_a_viewer_sees_everything_and_moves_nothing(guarded: Daemon, open_page: Open) -> None:
+    page = open_page(guarded.address)
+    sign_in(page, guarded.keys["viewer"])
     expect(page.locator("canvas").first).to_have_attribute("data-points", "20")
     expect(page.get_by_text("it sees everything and changes nothing")).to_be_visible()
     expect(page.get_by_role("button", name="STOP")).to_be_disabled()

@@ -195,14 +195,15 @@ def test_a_viewer_sees_everything_and_changes_nothing(
     tmp_path_factory: pytest.TempPathFactory, open_page: Open
 ) -> None:
     daemon = quick_rig(tmp_path_factory.mktemp("asked"), keys=True)
-    operator, viewer = daemon.key("operator"), daemon.key("viewer")
+    for role in ("operator", "viewer"):
+        daemon.make_key(role)
     daemon.start()
     try:
-        headers = {"Authorization": f"Bearer {operator}"}
+        headers = {"Authorization": f"Bearer {daemon.keys['operator']}"}
         with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60, headers=headers) as api:
             calibrate(api)
         page = open_page(f"{daemon.address}#/judge")
-        page.get_by_label("Key").fill(viewer)
+        page.get_by_label("Key").fill(daemon.keys["viewer"])
         page.get_by_role("button", name="Sign in").click()
         shown(page)
         page.get_by_label(re.compile("Drop view")).first.check()
