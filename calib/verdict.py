@@ -131,11 +131,11 @@ def _figures(quality: Quality) -> list[str]:
         figures.append(f"{by} to {', '.join(errors)}")
     if quality.position_std_m is not None and quality.rotation_std_rad is not None:
         figures.append(
-            f"in the calibrated range the camera's position is known to {_millis(quality.position_std_m)} mm, "
-            f"its rotation to {_millis(quality.rotation_std_rad)} mrad"
+            f"in the calibrated range the camera's position is known to {_millis(quality.position_std_m, 'mm')}, "
+            f"its rotation to {_millis(quality.rotation_std_rad, 'mrad')}"
         )
     return figures
 
 
-def _millis(spread: MeanAndMax) -> str:
-    return f"{1e3 * spread.mean:.2g} (at worst {1e3 * spread.max:.2g})"
+def _millis(spread: MeanAndMax, unit: str) -> str:
+    return f"{1e3 * spread.mean:.2g} {unit} (at worst {1e3 * spread.max:.2g} {unit})"
