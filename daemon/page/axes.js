@@ -13,7 +13,7 @@ export function mountAxes(element, page, signal) {
   const cards = h("div", { class: "cards" });
   const fieldset = h("fieldset", { class: "bare" }, cards);
   const pad = h("div", { class: "pad", tabindex: "0", role: "application", "aria-describedby": "pad-help" });
-  const help = h("p", { id: "pad-help", class: "hint" }, "With the focus here: ↑ ↓ choose the axis, ← → jog it, held for as long as the key is.");
+  const help = h("p", { id: "pad-help", class: "hint" }, "Click above, then ↑ ↓ choose the axis and ← → move it: by a step, or for as long as the key is held.");
   fill(element, h("div", { class: "panel-head" }, h("h2", { id: "axes-title" }, "Axes")), fieldset, h("div", {}, pad, help));
   page.guard(fieldset, signal);
 
@@ -157,7 +157,7 @@ class Card {
       min: low,
       max: high,
       required: true,
-      placeholder: "go to",
+      placeholder: `go to, ${unit}`,
       "aria-label": `Go to, ${name}, ${unit}`,
       title: `${number(low, digits)} to ${quantity(high, unit, digits)}`,
     });

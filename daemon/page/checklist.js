@@ -22,7 +22,7 @@ export function mountChecklist(element, page, signal) {
     const against = checks.filter(({ ok }) => ok === false).length;
     outcome.dataset.kind = ready ? "good" : "poor";
     const things = against === 1 ? "One thing is" : `${against} things are`;
-    setText(outcome, ready ? "Nothing stands against a run." : `${things} not as it should be for a good calibration.`);
+    setText(outcome, ready ? "Ready: nothing stands against a run." : `${things} not as it should be for a good calibration.`);
   }
 
   return {

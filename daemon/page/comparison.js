@@ -3,7 +3,7 @@
 import { fill, h, table } from "./elements.js";
 import { labelOf, shown } from "./paper_tables.js";
 import { number, quantity } from "./units.js";
-import { activation, digitsOf, verdict } from "./verdict.js";
+import { activation, digitsOf, takeAway, verdict } from "./verdict.js";
 
 /** Parameters that are listed. */
 const MOST = 10;
@@ -11,8 +11,8 @@ const MOST = 10;
 /** Fill `element` with the calibration `entry` beside `other`; both as `GET /calibrations/{id}` has them. */
 export async function mountComparison(element, { entry, other, page, signal, done }) {
   const card = (title, each) =>
-    h("article", { class: "card", "aria-label": title }, h("h3", {}, title), verdict(each), facts(each), activation(each, page, signal, done));
-  const cards = h("div", { class: "side-by-side" }, card("This one", entry), card("The other", other));
+    h("article", { class: "card", "aria-label": title }, h("h3", {}, title), verdict(each), facts(each), activation(each, page, signal, done), takeAway(each));
+  const cards = h("div", { class: "side-by-side" }, card("This one, shown below", entry), card("The other", other));
   const words = h("p", { role: "status" }, "Comparing …");
   fill(element, cards, words);
   let found;
@@ -41,12 +41,13 @@ function facts({ calibration }) {
 }
 
 function poseTable({ poses, poses_apart_from_world: apart }) {
-  const columns = ["The camera’s pose", "Position (mm)", "at most", "Rotation (mrad)", "at most", "Standard deviations, at most"];
+  const values = ({ position_mean_m, position_max_m, rotation_mean_rad, rotation_max_rad }) =>
+    [position_mean_m, position_max_m, rotation_mean_rad, rotation_max_rad].map((value) => 1000 * value);
+  const digits = values(poses).map((value, i) => digitsOf(Math.max(value, values(apart)[i])));
+  const columns = ["The camera’s pose", "Position (mm)", "at most (mm)", "Rotation (mrad)", "at most (mrad)", "In standard deviations"];
   const row = (name, found) => [
     name,
-    ...[found.position_mean_m, found.position_max_m, found.rotation_mean_rad, found.rotation_max_rad].map((value) =>
-      number(1000 * value, digitsOf(1000 * value)),
-    ),
+    ...values(found).map((value, i) => number(value, digits[i])),
     number(found.stds, 2),
   ];
   const numeric = columns.map((title, i) => (i ? { title, number: true } : title));

@@ -3,8 +3,8 @@
 import { fill, h } from "./elements.js";
 
 const BARS = [
-  ["x", "X", "How far the target went from side to side"],
-  ["y", "Y", "How far it went from top to bottom"],
+  ["x", "X, sideways", "How far the target went from side to side"],
+  ["y", "Y, up and down", "How far it went from top to bottom"],
   ["size", "Size", "How large it was in the largest view"],
   ["skew", "Skew", "How far it leaned"],
 ];

@@ -10,7 +10,7 @@ import { fill, h, table } from "./elements.js";
 import { paperTables, parameterTables } from "./paper_tables.js";
 import { drawByDirection, drawByPlace, magnification, pointsOf, summaryOf } from "./residual_plots.js";
 import { moment, quantity } from "./units.js";
-import { activation, advice, digitsOf, figures, groundsOf, judgementOf, verdict } from "./verdict.js";
+import { activation, advice, digitsOf, figures, groundsOf, judgementOf, movedBy, takeAway, verdict } from "./verdict.js";
 import { mountViews } from "./worst_views.js";
 
 export async function mount(element, page, { signal, path }) {
@@ -47,7 +47,7 @@ async function show(element, page, signal, [chosen, other]) {
   const views = h("div", {}, h("p", { class: "empty" }, "Loading …"));
   fill(
     element,
-    other ? beside : panel("Verdict", "verdict", verdict(entry), activation(entry, page, signal, reload), takeAway(id)),
+    other ? beside : panel("Verdict", "verdict", verdict(entry), activation(entry, page, signal, reload), takeAway(entry)),
     panel("Predicted against measured", "figures", figures(quality)),
     panel("What would help most", "advice", advice(quality)),
     panel("Views", "views", views),
@@ -66,10 +66,6 @@ async function show(element, page, signal, [chosen, other]) {
     return;
   }
   await showViews(views, plots, { entry, axes, page, signal });
-}
-
-function takeAway(id) {
-  return h("p", {}, h("a", { href: `#/takeaway/${id}` }, "Take it away"), " as a report, a URDF, or what ROS and OpenCV read");
 }
 
 /** Show the views, and then, since they have to be looked for first, their residuals. */
@@ -94,12 +90,12 @@ async function showViews(views, plots, { entry, axes, page, signal }) {
 
 /** Fill `element` with both plots of residuals, and the choice of what is in them. */
 function mountPlots(element, residuals, signal) {
-  const joints = [...new Set(residuals.views.map((view) => view.joint ?? "free"))];
+  const joints = [...new Set(residuals.views.map((view) => view.joint))];
   const choices = [
     ["all views", () => true],
     ["views of the fit", (view) => view.use === "fit" && !view.set_aside],
     ["held-out views", (view) => view.use === "verify"],
-    ...joints.map((joint) => [`views of ${joint === "free" ? "several joints" : joint}`, (view) => (view.joint ?? "free") === joint]),
+    ...joints.map((joint) => [`views of ${movedBy(joint)}`, (view) => view.joint === joint]),
   ].filter(([, has]) => residuals.views.some(has));
   const choice = h("select", { id: "residuals-of" }, ...choices.map(([name], i) => h("option", { value: i }, name)));
   const direction = h("canvas", { role: "img" });
@@ -121,8 +117,10 @@ function mountPlots(element, residuals, signal) {
     drawByPlace(place, points, size, times);
     const { count, rms, meanX, meanY } = summaryOf(points);
     const digits = digitsOf(rms);
-    const off = `${count} points, rms ${quantity(rms, "px", digits)}; on the mean ${quantity(meanX, "px", digits)} to the right and ${quantity(meanY, "px", digits)} down`;
-    fill(directionWords, `${off}. A round cloud around the middle is noise.`);
+    const towards = (mean, more, less) => `${quantity(Math.abs(mean), "px", digits)} ${mean < 0 ? less : more}`;
+    const mean = `${towards(meanX, "to the right", "to the left")} and ${towards(meanY, "down", "up")}`;
+    const off = `${count} points, rms ${quantity(rms, "px", digits)}; on average ${mean}`;
+    fill(directionWords, `${off}. A round cloud around the middle is noise; a long one, or clumps, is what the calibration does not describe.`);
     fill(placeWords, `Arrows are ${times.toLocaleString()} times as long as the residuals. Ones that swirl, or grow to the borders, tell of the lens.`);
     direction.setAttribute("aria-label", `Residuals by direction: ${off}`);
     place.setAttribute("aria-label", `Residuals by place in the picture: ${count} points`);

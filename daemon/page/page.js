@@ -48,7 +48,7 @@ export class Page {
     }
     if (act === "operate") return null;
     const { stop, lease } = state.rig;
-    if (stop.latched) return "A stop is latched: acknowledge it first, at the top of the page.";
+    if (stop.latched) return "All is stopped: acknowledge that first, at the top of the page.";
     if (lease !== null && lease.expires_at === null) return "A calibration run moves the rig: wait, or cancel it.";
     if (lease !== null && !this.lease.held) return `“${lease.owner}” has control: wait, or take over, at the top.`;
     return null;

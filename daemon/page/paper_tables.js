@@ -1,7 +1,7 @@
 /** The paper's tables 1 to 4 for this rig, and all parameters with their standard deviations. */
 
 import { h, table } from "./elements.js";
-import { number } from "./units.js";
+import { number, reading } from "./units.js";
 
 const DEGREES = 180 / Math.PI;
 const LABELS = {
@@ -34,12 +34,12 @@ function travelTable(found, axes) {
   const trusted = found.rows.some((row) => row.encoder !== null);
   const columns = [
     numeric(`Travel (${far})`),
-    numeric(`To pictures (${fine})`),
+    numeric(`Off the pictures (${fine})`),
     numeric("%"),
     numeric(`Known to (${fine})`),
-    ...(trusted ? [numeric(`To encoder (${fine})`), numeric("%")] : []),
+    ...(trusted ? [numeric(`Off the encoder (${fine})`), numeric("%")] : []),
     numeric(`Paper: travel (${far})`),
-    numeric(`Error (${fine})`),
+    numeric(`Paper: error (${fine})`),
     numeric("%"),
   ];
   const count = Math.max(found.rows.length, found.paper.length);
@@ -51,7 +51,7 @@ function travelTable(found, axes) {
     const paper = theirs ? [travel(theirs.travel), error(theirs.error), percent(theirs.percent)] : ["", "", ""];
     return [...own, ...encoder, ...paper];
   });
-  const start = found.start.map((value, i) => `${axes[i]?.name ?? ""} ${number(value, 2)}${unitOf(axes[i])}`).join(", ");
+  const start = found.start.map((value, i) => `${axes[i]?.name ?? ""} ${readingOf(value, axes[i])}`).join(", ");
   const caption = `Table ${found.number}: ${found.joint}, predicted travel against measured, from ${start}`;
   return table(caption, columns, rows);
 
@@ -111,12 +111,12 @@ export function shown(value, std, unit) {
 
 /** Return readings of all axes in a row, each with its unit. */
 export function readings(values, axes) {
-  return values.map((value, i) => `${number(value, 2)}${unitOf(axes[i])}`).join(", ");
+  return values.map((value, i) => readingOf(value, axes[i])).join(", ");
 }
 
-function unitOf(axis) {
-  if (!axis) return "";
-  return axis.unit === "deg" ? "°" : ` ${axis.unit}`;
+/** Return a reading of an axis; as a number where the rig has no such axis any more. */
+function readingOf(value, axis) {
+  return axis === undefined ? number(value, 2) : reading(value, axis);
 }
 
 function numeric(title) {

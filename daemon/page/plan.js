@@ -17,6 +17,7 @@ export function mountPlan(element, page, signal, changed) {
   const legend = h(
     "p",
     { class: "hint legend" },
+    h("span", {}, "From left to right, position by position:"),
     h("span", { class: "dot fit" }, "moves, to calibrate from"),
     h("span", { class: "dot verify" }, "moves, to verify by"),
     h("span", { class: "dot standing" }, "stands still"),

@@ -12,7 +12,7 @@ export function mountPreparation(element, page, signal) {
   const panel = (name) => h("section", { class: `panel ${name}`, "aria-labelledby": `${name}-title` });
   const [unfinished, checks, planned, start, picture] = ["unfinished", "checklist", "plan", "start", "picture"].map(panel);
   unfinished.hidden = true;
-  fill(element, h("div", { class: "preparation" }, h("div", { class: "column" }, unfinished, checks, start), picture, planned));
+  fill(element, h("div", { class: "preparation" }, h("div", { class: "column" }, unfinished, checks), start, picture, planned));
 
   const checklist = mountChecklist(checks, page, signal);
   const plan = mountPlan(planned, page, signal, () => look());
@@ -46,12 +46,12 @@ export function mountPreparation(element, page, signal) {
 
 /** Fill `element` with the start; returns what is told how long the run will take. */
 function mountStart(element, page, signal, plan) {
-  const note = h("input", { id: "note", maxlength: "1000", placeholder: "for the lab book: which target, what has changed" });
+  const note = h("input", { id: "note", maxlength: "1000", placeholder: "which target, what has changed" });
   const about = h("p", {});
   const form = h(
     "form",
     {},
-    h("fieldset", { class: "bare" }, h("label", { for: "note" }, "Note"), h("div", { class: "start-line" }, note, h("button", { class: "primary" }, "Start the calibration"))),
+    h("fieldset", { class: "bare" }, h("label", { for: "note" }, "Note for the lab book"), h("div", { class: "start-line" }, note, h("button", { class: "primary" }, "Start the calibration"))),
   );
   fill(element, h("h2", { id: "start-title" }, "Start"), about, form);
   page.guard(form.querySelector("fieldset"), signal);

@@ -77,7 +77,7 @@ function mountAdvance(element, page, signal, run, positions) {
   const resume = button("Resume", () => post("resume"));
   const cancel = button("Cancel", () => post("cancel"));
   const controls = h("fieldset", { class: "bare" }, h("div", { class: "buttons" }, pause, resume, cancel));
-  const note = [`Begun at ${clock(run.created_at)}`, run.owner && ` by ${run.owner}`, run.note && `: “${run.note}”`];
+  const note = [`Started at ${clock(run.created_at)}`, run.owner && ` by ${run.owner}`, run.note && `: “${run.note}”`];
   const head = h("div", { class: "panel-head" }, h("h2", { id: "advance-title" }, "Calibration run"), h("p", { class: "hint" }, note));
   fill(element, head, h("div", { class: "advance-line" }, what, left), bar, sweeps, controls);
   page.guard(controls, signal, () => page.obstacle("operate"));
@@ -184,7 +184,7 @@ function verdict(page, { end, quality }) {
   return [
     h("h2", { id: "result-title" }, "Verdict"),
     h("p", { class: "verdict", role: "status", "data-judgement": quality?.judgement }, said(quality)),
-    isActive && h("p", {}, "Poses are computed from it from now on."),
+    isActive && h("p", {}, "In use: poses are computed from it."),
     h("div", { class: "buttons" }, judgeLink(end.calibration_id), again()),
   ];
 }
@@ -222,7 +222,7 @@ function said(quality) {
 }
 
 function judgeLink(calibrationId) {
-  return h("a", { class: "button", href: `#/judge/${calibrationId}` }, "Judge this calibration");
+  return h("a", { class: "button primary", href: `#/judge/${calibrationId}` }, "Judge this calibration");
 }
 
 function again() {

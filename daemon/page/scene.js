@@ -2,7 +2,7 @@
 
 import { again } from "./again.js";
 import { fill, h, setText, table } from "./elements.js";
-import { draw, enlargement, extent, origin } from "./scene_drawing.js";
+import { draw, ends, enlargement, extent, origin } from "./scene_drawing.js";
 import { SceneView, minus, plus, times } from "./scene_view.js";
 import { number, quantity } from "./units.js";
 
@@ -32,7 +32,7 @@ export function mountScene(element, page, signal) {
     button("+", "Zoom in", () => change(() => view.zoom(1.25))),
   );
   const help = h("p", { id: "scene-help", class: "hint" }, "Drag or ← → ↑ ↓ turn it, + and − zoom, 0 fits. Frames: x red, y green, z blue.");
-  const drawing = h("div", { hidden: true }, h("div", { class: "scene-frame" }, canvas), scale, help, numbers);
+  const drawing = h("div", { class: "drawing", hidden: true }, h("div", { class: "scene-frame" }, canvas), scale, help, numbers);
   fill(element, h("div", { class: "panel-head" }, h("h2", { id: "scene-title" }, "Rig in 3-D"), controls), missing, drawing);
 
   const view = new SceneView();
@@ -74,7 +74,9 @@ export function mountScene(element, page, signal) {
   }
 
   function fit() {
-    view.fit(extent(scene), canvas.clientWidth, canvas.clientHeight);
+    const points = extent(scene);
+    view.measure(points);
+    view.fit([...points, ...ends(scene, view.size)], canvas.clientWidth, canvas.clientHeight);
     enlarged = enlargement(scene, view.size);
     const drawn = `Ellipsoids: one standard deviation of a place, drawn ${enlarged?.toLocaleString()} times as large.`;
     setText(scale, enlarged === null ? "How sure the places are is not known." : drawn);
@@ -152,22 +154,23 @@ export function mountScene(element, page, signal) {
 
 /** Return the scene in numbers, in the world's frame. */
 function tableOf({ base, joints, cameras, target }) {
-  const place = (point) => point.map((each) => number(1000 * each, 1)).join(", ");
+  const place = (point) => point.map((each) => number(1000 * each, 1));
   const way = (vector) => vector.map((each) => number(each, 3)).join(", ");
   const column = (pose, i) => pose.slice(0, 3).map((row) => row[i]);
-  const std = ({ uncertainty }) => (uncertainty === null ? "–" : quantity(1000 * Math.max(...uncertainty.radii), "mm", 3));
+  const std = ({ uncertainty }) => (uncertainty === null ? "–" : `± ${quantity(1000 * Math.max(...uncertainty.radii), "mm", 3)}`);
   const rows = [
-    ["base", place(origin(base)), "–", "–"],
+    ["base", ...place(origin(base)), "–", "–"],
     ...joints.flatMap((joint) => [
-      [`axis of ${joint.name}`, place(joint.point), way(joint.axis), std(joint)],
-      [`link of ${joint.name}`, place(origin(joint.frame)), `z ${way(column(joint.frame, 2))}`, "–"],
+      [`axis of ${joint.name}`, ...place(joint.point), way(joint.axis), std(joint)],
+      [`link of ${joint.name}`, ...place(origin(joint.frame)), `z ${way(column(joint.frame, 2))}`, "–"],
     ]),
-    ...cameras.map((camera) => [`camera ${camera.name}`, place(origin(camera.pose)), `looks ${way(column(camera.pose, 2))}`, std(camera)]),
+    ...cameras.map((camera) => [`camera ${camera.name}`, ...place(origin(camera.pose)), `looks ${way(column(camera.pose, 2))}`, std(camera)]),
   ];
   if (target.outline.length) {
     const [first, , opposite] = target.outline;
-    rows.push(["target’s middle", place(plus(first, times(minus(opposite, first), 0.5))), "normal 0, 0, 1", "–"]);
+    rows.push(["target’s middle", ...place(plus(first, times(minus(opposite, first), 0.5))), "normal 0, 0, 1", "–"]);
   }
-  const columns = ["What", { title: "x, y, z (mm)", number: true }, "Direction", { title: "Standard deviation", number: true }];
-  return table("Places in the world’s frame, which is the target’s", columns, rows);
+  const numeric = (title) => ({ title, number: true });
+  const columns = ["What", numeric("x (mm)"), numeric("y (mm)"), numeric("z (mm)"), "Direction", numeric("Known to")];
+  return table("Places in the world’s frame, which is the target’s; known to: one standard deviation", columns, rows);
 }

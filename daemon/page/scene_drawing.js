@@ -5,6 +5,8 @@ import { length, minus, normals, plus, times, unit } from "./scene_view.js";
 const FRAME = 0.07;
 const AXIS = 0.22;
 const RING = 0.05;
+/** How high a name is (px). */
+const LINE = 14;
 const AROUND = Array.from({ length: 49 }, (_, i) => (i * Math.PI) / 24);
 
 /** Return the points by which a scene is framed: link frames may lie far off, where axes are nearly parallel. */
@@ -12,6 +14,11 @@ export function extent({ joints, cameras, target }) {
   const seen = cameras.flatMap(({ pose, corners }) => [origin(pose), ...(corners ?? [])]);
   const points = [...target.outline, ...seen, ...joints.map(({ point }) => point)];
   return points.length ? points : [[0, 0, 0]];
+}
+
+/** Return the ends of the axes as they are drawn in a scene of `size`. */
+export function ends({ joints }, size) {
+  return joints.flatMap(({ axis, point }) => [-AXIS, AXIS].map((share) => plus(point, times(axis, share * size))));
 }
 
 /** Return by how much to enlarge ellipsoids so that the largest is well seen: 1, 2 or 5 times a power of ten. */
@@ -44,6 +51,12 @@ export function draw(context, scene, view, enlarged, colours) {
   }
   for (const camera of scene.cameras) pen.camera(camera);
   if (enlarged !== null) for (const each of sure(scene)) pen.ellipsoid(each, enlarged);
+  pen.names();
+}
+
+function overlap(one, other) {
+  const apart = Math.abs(one.y - other.y) > LINE;
+  return !apart && one.x < other.x + other.width && other.x < one.x + one.width;
 }
 
 function sure({ joints, cameras }) {
@@ -54,6 +67,7 @@ class Pen {
   #context;
   #view;
   #colours;
+  #labels = [];
 
   constructor(context, view, colours) {
     this.#context = context;
@@ -145,15 +159,26 @@ class Pen {
     this.#path([[x - dx - dy / 2, y - dy + dx / 2], [x, y], [x - dx + dy / 2, y - dy - dx / 2]], colour, 1.5);
   }
 
-  /** Write a name beside a point, above it or below. */
-  #label(text, point, colour, lower = -6) {
+  /** Write the names, the camera's first, over all else and none over another: beside their points, above or below. */
+  names() {
     const context = this.#context;
-    const [x, y] = plus(this.#view.at(point), [8, lower]);
+    const written = [];
     context.strokeStyle = this.#colours.surface;
     context.lineWidth = 4;
-    context.strokeText(text, x, y);
-    context.fillStyle = colour;
-    context.fillText(text, x, y);
+    for (const { text, at, colour, lower } of this.#labels.toReversed()) {
+      const { width } = context.measureText(text);
+      const places = [[8, lower], [8, 10 - lower], [-8 - width, lower], [-8 - width, 10 - lower], [8, 22 + lower]];
+      const boxes = places.map((place) => plus(at, place)).map(([x, y]) => ({ x, y, width }));
+      const box = boxes.find((one) => !written.some((other) => overlap(one, other))) ?? boxes[0];
+      written.push(box);
+      context.strokeText(text, box.x, box.y);
+      context.fillStyle = colour;
+      context.fillText(text, box.x, box.y);
+    }
+  }
+
+  #label(text, point, colour, lower = -6) {
+    this.#labels.push({ text, at: this.#view.at(point), colour, lower });
   }
 
   #line(points, colour, width, style) {

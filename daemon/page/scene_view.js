@@ -47,11 +47,16 @@ export class SceneView {
     this.#middle = this.#middle.map((each, i) => this.#frame[i] / 2 + factor * (each - this.#frame[i] / 2));
   }
 
+  /** Take the size of a scene from its `points`. */
+  measure(points) {
+    const [low, high] = box(points);
+    this.size = Math.max(length(minus(high, low)), 1e-6);
+  }
+
   /** Bring all `points` into a frame of `width` by `height`. */
   fit(points, width, height) {
     const [low, high] = box(points);
     this.#centre = times(plus(low, high), 0.5);
-    this.size = Math.max(length(minus(high, low)), 1e-6);
     this.#frame = [width, height];
     [this.#scale, this.#middle] = [1, [0, 0]];
     const [least, most] = box(points.map((point) => this.at(point)));

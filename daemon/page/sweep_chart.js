@@ -1,7 +1,7 @@
 /** A small chart of one axis: where it stands at each position of the plan, between its limits. */
 
 import { h, svg } from "./elements.js";
-import { reading } from "./units.js";
+import { measureOf, number, reading } from "./units.js";
 
 const WIDTH = 360;
 const HEIGHT = 84;
@@ -25,6 +25,8 @@ export function sweepChart(axis, index, positions) {
   });
   const moved = positions.filter(({ joint }) => joint === null || joint === axis.name).map(({ readings }) => readings[index]);
   const at = (value) => reading(value, axis);
+  const { factor, digits } = measureOf(axis);
+  const between = `${number(low * factor, digits)} to ${at(high)}`;
   const span = moved.length ? `from ${at(Math.min(...moved))} to ${at(Math.max(...moved))}` : "not moved";
   return h(
     "figure",
@@ -32,12 +34,12 @@ export function sweepChart(axis, index, positions) {
     h("figcaption", {}, h("strong", {}, axis.name), ` ${span}`),
     svg(
       "svg",
-      { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${axis.name}: ${span}, within ${at(low)} to ${at(high)}` },
+      { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${axis.name}: ${span}, within ${between}` },
       level(low, "limit"),
       level(high, "limit"),
       axis.homed && axis.position !== null ? level(Math.min(high, Math.max(low, axis.position)), "now") : null,
       dots,
     ),
-    h("p", { class: "hint ends" }, h("span", {}, `limits ${at(low)} to ${at(high)}`), axis.homed && h("span", {}, `now ${at(axis.position)}`)),
+    h("p", { class: "hint ends" }, h("span", {}, `limits ${between}`), axis.homed && h("span", {}, `now ${at(axis.position)}`)),
   );
 }

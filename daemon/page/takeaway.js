@@ -2,7 +2,7 @@
 
 import { address } from "./api.js";
 import { fill, h } from "./elements.js";
-import { bytes, moment } from "./units.js";
+import { bytes, moment, sentenceOf } from "./units.js";
 
 export async function mount(element, page, { signal, path: [chosen] }) {
   const calibrations = await page.api.get("calibrations", { signal });
@@ -20,7 +20,6 @@ export async function mount(element, page, { signal, path: [chosen] }) {
   panel.append(
     h("p", { class: "choice" }, h("label", { for: "takeaway-of" }, "Calibration "), choice),
     list,
-    h("p", { class: "hint" }, "A report is made when it is asked for: the download begins after some seconds."),
   );
   const exports = await page.api.get(`calibrations/${id}/exports`, { signal });
   fill(list, ...exports.map((each) => h("li", {}, ...entry(id, each))));
@@ -34,9 +33,10 @@ function named(calibration) {
 function entry(id, { name, purpose, size, notes, problem }) {
   const file = `calibrations/${id}/exports/${encodeURIComponent(name)}`;
   const title = problem === null ? h("a", { href: address(file), download: "" }, name) : h("span", { class: "muted" }, name);
+  const weight = size === null ? "made when asked for, in seconds" : bytes(size);
   return [
-    h("p", {}, title, size === null ? null : h("span", { class: "size" }, bytes(size))),
-    h("p", {}, ...coded(purpose)),
+    h("p", {}, title, problem === null && h("span", { class: "size" }, weight)),
+    h("p", {}, ...coded(sentenceOf(purpose))),
     ...notes.map((note) => h("p", { class: "hint" }, `${note}.`)),
     problem === null ? null : h("p", { class: "hint" }, `It cannot be had: ${problem}.`),
   ];

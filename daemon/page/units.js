@@ -64,11 +64,12 @@ export function clock(time) {
 
 /** Return the date and time of day of an RFC 3339 time, here. */
 export function moment(time) {
-  const options = { year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit" };
+  const options = { year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit" };
   return new Date(time).toLocaleString([], options);
 }
 
-/** Return a message of the daemon, which begins small and has no full stop, as a sentence by itself. */
+/** Return a message of the daemon, which is in ASCII, begins small and has no full stop, as a sentence by itself. */
 export function sentenceOf(message) {
-  return `${message[0].toUpperCase()}${message.slice(1)}${/[.?!]$/.test(message) ? "" : "."}`;
+  const begun = message[0].toUpperCase() + message.slice(1);
+  return `${begun.replaceAll("+-", "± ")}${/[.?!]$/.test(message) ? "" : "."}`;
 }

@@ -24,13 +24,12 @@ export function verdict(entry) {
 
 /** Return in words which calibration this is. */
 export function nameOf(entry) {
-  const active = entry.active ? "; poses are computed from it" : "";
-  return `Made ${moment(entry.created_at)}, ${entry.method === "ml" ? "most likely" : "closed form"}${active}`;
+  return `Made ${moment(entry.created_at)}, ${entry.method === "ml" ? "by maximum likelihood" : "in closed form"}`;
 }
 
 /** Return a button that has poses computed from a calibration, in a fieldset that is disabled for who may not. */
 export function activation(entry, page, signal, done) {
-  if (entry.active) return h("p", { class: "active" }, "In use");
+  if (entry.active) return h("p", { class: "active" }, "In use: poses are computed from it.");
   const activate = () =>
     page.attempt(async () => {
       await page.api.post(`calibrations/${entry.id}/activate`);
@@ -41,6 +40,11 @@ export function activation(entry, page, signal, done) {
   const fieldset = h("fieldset", { class: "bare" }, button);
   page.guard(fieldset, signal, () => page.obstacle("operate"));
   return fieldset;
+}
+
+/** Return where a calibration is taken away from. */
+export function takeAway(entry) {
+  return h("p", {}, h("a", { href: `#/takeaway/${entry.id}` }, "Take it away"), " as a report, a URDF, or what ROS and OpenCV read");
 }
 
 /** Return predicted against measured: the figures of the fit and of held-out views, in all and by joint. */
@@ -54,13 +58,16 @@ export function figures(quality) {
     ["Camera’s position known to", millis(quality.position_std_m, "mm")],
     ["Camera’s rotation known to", millis(quality.rotation_std_rad, "mrad")],
   ];
-  const rows = (quality.joints ?? []).map((joint) => [
-    joint.joint ?? "several",
+  const joints = quality.joints ?? [];
+  const digits = digitsOf(Math.max(...joints.flatMap((joint) => [joint.rms_px, joint.held_out_px])));
+  const rows = joints.map((joint) => [
+    movedBy(joint.joint),
     String(joint.views),
-    number(joint.rms_px, digitsOf(joint.rms_px)),
-    number(joint.held_out_px, digitsOf(joint.held_out_px)),
+    number(joint.rms_px, digits),
+    number(joint.held_out_px, digits),
   ]);
-  const columns = ["Joint", { title: "Views", number: true }, { title: "Fit (px)", number: true }, { title: "Predicted (px)", number: true }];
+  const numeric = (title) => ({ title, number: true });
+  const columns = ["Moved", numeric("Views of the fit"), numeric("Their residual (px)"), numeric("Held-out views (px)")];
   return [
     h("dl", { class: "facts" }, ...facts.map(([what, value]) => h("div", {}, h("dt", {}, what), h("dd", {}, value)))),
     table("Error by joint (rms)", columns, rows),
@@ -74,8 +81,13 @@ export function advice(quality) {
   const list = (texts) => h("ul", { class: "sentences" }, ...texts.map((text) => h("li", {}, sentenceOf(text))));
   return [
     sentences.length ? list(sentences) : h("p", { class: "empty" }, "Nothing is badly known: more views would only make what is known a little surer."),
-    quality.corrections?.length ? [h("h3", {}, "Taken into account"), list(quality.corrections)] : null,
+    quality.corrections?.length ? [h("h3", {}, "Taken into account"), list(quality.corrections.map((text) => text.replace(/, taken into account$/, "")))] : null,
   ];
+}
+
+/** Return what moves in a view, by the joint that moves alone; null where none does. */
+export function movedBy(joint) {
+  return joint ?? "all axes";
 }
 
 /** Return how many digits of a small number mean something: three. */
@@ -88,5 +100,6 @@ function millis(spread, unit) {
   if (!spread) return "–";
   const mean = 1000 * spread.mean;
   const worst = 1000 * spread.max;
-  return `${quantity(mean, unit, digitsOf(mean))} (at worst ${number(worst, digitsOf(worst))})`;
+  const digits = digitsOf(worst);
+  return `${quantity(mean, unit, digits)} (at worst ${quantity(worst, unit, digits)})`;
 }

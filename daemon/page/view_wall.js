@@ -63,7 +63,7 @@ export function mountViews(element, page, signal, runId) {
 
   function tally() {
     empty.hidden = views.size > 0;
-    setText(count, views.size ? `${views.size}, the newest first. ← → go from one to the next, Enter enlarges.` : "");
+    setText(count, views.size ? `${views.size}, the newest first; px: how far its points are off. Click one, or ← → and Enter, to enlarge it.` : "");
     if (list.contains(document.activeElement)) return;
     list.querySelectorAll("button").forEach((button, i) => (button.tabIndex = i ? -1 : 0));
   }

@@ -5,7 +5,7 @@ import { fill, h } from "./elements.js";
 import { readings } from "./paper_tables.js";
 import { drawOnPicture, magnification, summaryOf } from "./residual_plots.js";
 import { number, quantity } from "./units.js";
-import { digitsOf } from "./verdict.js";
+import { digitsOf, movedBy } from "./verdict.js";
 
 /** Views that are listed before the rest is asked for. */
 const FEW = 8;
@@ -19,6 +19,7 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
   const before = new Set(dropped);
   const sorted = [...views].sort((a, b) => miss(b) - miss(a));
   const worst = Math.max(...sorted.map(miss), 1e-9);
+  const digits = digitsOf(worst);
   const body = h("tbody", {});
   const all = h("button", { type: "button", class: "plain" });
   const again = h("button", { type: "button", class: "primary" });
@@ -45,16 +46,16 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
     const look = h("button", { type: "button", class: "plain", onclick: () => show(view) }, `View ${view.number}`);
     const value = view.held_out_px ?? view.residual_px;
     const length = h("i", { class: "length", "aria-hidden": "true" });
-    length.style.width = `${(100 * Math.max(miss(view), 0)) / worst}%`;
+    length.style.setProperty("--share", Math.max(miss(view), 0) / worst);
     const remark = view.left_out ? "left out" : view.set_aside ? "set aside" : view.use === "verify" ? "held out" : "";
     return h(
       "tr",
       { "aria-selected": shown?.number === view.number ? "true" : null },
       h("td", {}, drop),
       h("th", { scope: "row" }, look),
-      h("td", {}, view.joint ?? "free", remark ? [" ", h("span", { class: "remark" }, remark)] : null),
+      h("td", {}, movedBy(view.joint), remark ? [" ", h("span", { class: "remark" }, remark)] : null),
       h("td", { class: "number" }, readings(view.readings, axes)),
-      h("td", { class: "number error" }, length, h("span", {}, number(value, digitsOf(value)))),
+      h("td", { class: "number error" }, length, h("span", {}, number(value, digits))),
     );
   }
 
@@ -110,10 +111,10 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
     if (obstacle !== null || busy === null) return obstacle;
     return busy === run ? "Its views are being solved." : "A run is under way: wait for it, or cancel it.";
   });
-  const heads = ["Drop", "View", "Joint", "Readings", "Error (px)"].map((title, i) =>
+  const heads = ["Drop", "View", "Moved", "Readings", "Error (px)"].map((title, i) =>
     h("th", { scope: "col", class: i > 2 ? "number" : null }, title),
   );
-  const caption = "Views, the worst first: rms against the fit of all others where that is known, else against the fit";
+  const caption = "The worst first. Error: how far a view’s points are off (rms), predicted from all other views where that is known";
   fill(
     element,
     h(

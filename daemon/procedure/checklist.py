@@ -79,7 +79,9 @@ class Checklist:
     def _stop(self) -> Check:
         latch = self._rig.latch
         message = (
-            f"a stop is latched ({latch.reason}): acknowledge it" if latch.engaged else "no stop is latched"
+            f"stopped ({latch.reason}): acknowledge it"
+            if latch.engaged
+            else "no stop waits to be acknowledged"
         )
         return Check("stop", "The rig may move", not latch.engaged, message)
 
@@ -88,8 +90,8 @@ class Checklist:
         if self._runs.active is not None:
             return Check("free", title, False, f"run '{self._runs.active.record.id}' is under way")
         if lease is not None:  # perhaps by who asks
-            return Check("free", title, None, f"'{lease.owner}' holds the motion lease")
-        return Check("free", title, True, "nobody holds the motion lease")
+            return Check("free", title, None, f"'{lease.owner}' has control")
+        return Check("free", title, True, "nobody has control")
 
     def _homed(self) -> Check:
         lacking = [axis.spec.name for axis in self._rig.snapshot.axes if not axis.homed]

@@ -72,11 +72,11 @@ def test_a_calibration_from_the_checklist_to_the_verdict(
     expect(page.get_by_text("will be homed first")).to_be_visible()
     expect(page.get_by_role("row", name="slide to calibrate from 4 0.00 mm – 100.00 mm")).to_be_visible()
     expect(
-        page.get_by_role("img", name="pan: from −20.00° to 20.00°, within −20.00° to 20.00°")
+        page.get_by_role("img", name="pan: from −20.00° to 20.00°, within −20.00 to 20.00°")
     ).to_be_visible()
     page.get_by_role("button", name="Home all").click()
     expect(page.get_by_text("All axes know where they are")).to_be_visible()
-    expect(page.get_by_text("Nothing stands against a run")).to_be_visible()
+    expect(page.get_by_text("nothing stands against a run")).to_be_visible()
     page.get_by_label("Note").fill("from the page")
     page.get_by_role("button", name="Start the calibration").click()
 

@@ -174,7 +174,7 @@ def test_stop_by_the_button_and_by_a_key_wherever_the_focus_is(
     )
     assert api.get("/rig").json()["stop"]["latched"]
     expect(home).to_be_disabled()
-    expect(page.get_by_text("A stop is latched: acknowledge it first")).to_be_visible()
+    expect(page.get_by_text("All is stopped: acknowledge that first")).to_be_visible()
     page.get_by_role("button", name="Acknowledge").click()
     expect(home).to_be_enabled()
     assert not api.get("/rig").json()["stop"]["latched"]

@@ -151,7 +151,7 @@ async def test_what_stands_against_a_run_is_said(
     ready, found = await checks(client)
     assert not ready
     assert {name for name, check in found.items() if check["ok"] is False} == {"devices", "stop", "disk"}
-    assert (found["free"]["ok"], found["free"]["message"]) == (None, "'anna' holds the motion lease")
+    assert (found["free"]["ok"], found["free"]["message"]) == (None, "'anna' has control")
 
 
 @contextlib.asynccontextmanager
