@@ -1,7 +1,8 @@
 """How well each view agrees with itself: its points, where the camera may have been anywhere.
 
 That needs no chain, so that it can be told of a session that is still being taken. It tells of a blurred picture, a
-finger on the target, a print that is not flat.
+finger on the target, a print that is not flat. Where the views tell the lens, one more of them changes the fits of all,
+so that none is kept: together they take some milliseconds.
 """
 
 from collections.abc import Sequence

@@ -14,7 +14,7 @@ from daemon.access.access import Access, running_access
 from daemon.client_motion import ClientMotions
 from daemon.errors import DaemonError, StoreError
 from daemon.idempotency import AnswersGiven
-from daemon.judging import Judge
+from daemon.judging import Judge, Sightings
 from daemon.lease import LeaseDesk
 from daemon.live_detection import LiveDetection
 from daemon.live_picture import LivePicture
@@ -48,8 +48,9 @@ class Service:
         self.poses = PoseService(rig, self.figures.poses.inc)
         self.fallback: Fallback | None = None
         """What the active calibration was found to lack, until another is activated."""
-        self.runs = RunManager(rig, self.leases, store, self._use, self.figures.told)
-        self.judge = Judge(store, self.runs)
+        seen = Sightings()
+        self.runs = RunManager(rig, self.leases, store, self._use, self.figures.told, seen.note)
+        self.judge = Judge(store, self.runs, seen)
         self.pictures = LivePicture(rig)
         self.sightings = LiveDetection(rig)
         self.checklist = Checklist(rig, self.leases, self.runs, self.sightings, self.poses, store.folder)

@@ -56,10 +56,10 @@ class StoredOne:
 class Judge:
     """Answers from disk, in worker threads; the loop has nothing to compute."""
 
-    def __init__(self, store: Store, runs: RunManager) -> None:
+    def __init__(self, store: Store, runs: RunManager, sightings: Sightings) -> None:
         self._store = store
         self._runs = runs
-        self._sightings = Sightings()
+        self._sightings = sightings
         self._calibrations: Kept[str, StoredOne] = Kept(CALIBRATIONS)
         self._scenes: Kept[tuple[str, tuple[float, ...], tuple[int, ...] | None], Scene] = Kept(SCENES)
         self._residuals: Kept[str, Sequence[ViewMisses]] = Kept(RESIDUALS)

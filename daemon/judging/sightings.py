@@ -20,22 +20,23 @@ Seen = Observation | str
 
 
 class Sightings:
-    """What the views of runs show. One thread looks at a time, and leaves the other cores to the daemon."""
+    """What the views of runs show. One thread looks at a time, and leaves the other cores to the daemon.
+
+    A picture is known by its name, which a run never gives twice.
+    """
 
     def __init__(self) -> None:
         self._runs: OrderedDict[str, dict[str, Seen]] = OrderedDict()
         self._looking = asyncio.Lock()
 
-    async def of(self, run_id: str, session: Session) -> Observed:
-        """Return what the views of `session`, of the run `run_id`, show; raises SessionUnreadableError.
+    def note(self, run_id: str, picture: str, seen: Observation) -> None:
+        """Know what a run that is under way has found in a picture, as it would be found there again."""
+        self._of_run(run_id)[picture] = seen
 
-        Views are known again by their pictures' names, which a run never gives twice.
-        """
+    async def of(self, run_id: str, session: Session) -> Observed:
+        """Return what the views of `session`, of the run `run_id`, show; raises SessionUnreadableError."""
         async with self._looking:
-            known = self._runs.setdefault(run_id, {})
-            self._runs.move_to_end(run_id)
-            while len(self._runs) > KEPT:
-                self._runs.popitem(last=False)
+            known = self._of_run(run_id)
             new = [number for number, view in enumerate(session.views) if view.image not in known]
             if new:
                 known |= await in_worker(lambda: _look(session, new))
@@ -47,6 +48,14 @@ class Sightings:
             else:
                 observed.observations.append(replace(seen, view=number))
         return observed
+
+    def _of_run(self, run_id: str) -> dict[str, Seen]:
+        """Return what is known of a run's pictures, and forget the runs that nobody has asked of for longest."""
+        known = self._runs.setdefault(run_id, {})
+        self._runs.move_to_end(run_id)
+        while len(self._runs) > KEPT:
+            self._runs.popitem(last=False)
+        return known
 
 
 def _look(session: Session, numbers: Sequence[int]) -> dict[str, Seen]:

@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from calib.observations import Observation
 from calib.session_writer import SessionWriter
 from daemon.procedure.conclusion import Conclusion, conclude
 from daemon.procedure.event_log import EventLog
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from daemon.procedure.survey import Survey
 
 Checkpoint = Callable[[], Awaitable[None]]
+Note = Callable[[str, Observation], None]
+"""Takes what was found in a picture, by the picture's name."""
 End = tuple[RunState, str | None]
 
 UNSOLVED = "its views could not be solved: "
@@ -55,15 +58,19 @@ class Assignment(Protocol):
 class Calibrate:
     """Take the views that the session in `folder` lacks, and solve it; its calibration is to be used.
 
-    `starts`, as for `Procedure.starting`, are those of a new session; one that there is has its own.
+    `note` is called with what is found in each picture. `starts`, as for `Procedure.starting`, are those of a new
+    session; one that there is has its own.
     """
 
     moves = True
     activates = True
     remedy = "resume the run, or solve the views taken so far as they are"
 
-    def __init__(self, rig: Rig, folder: Path, starts: Mapping[str, Sequence[float]] = NOWHERE_ELSE) -> None:
+    def __init__(
+        self, rig: Rig, folder: Path, note: Note, starts: Mapping[str, Sequence[float]] = NOWHERE_ELSE
+    ) -> None:
         self.takes_views = True
+        self._note = note
         self._rig = rig
         self._folder = folder
         self._starts = starts
@@ -76,7 +83,7 @@ class Calibrate:
         await self._rig.stop_axes(list(self._rig.specs))
         if not writer.session.complete:
             survey = await finish(asyncio.to_thread(_survey))
-            await survey(self._rig, writer, log, checkpoint).take()
+            await survey(self._rig, writer, log, checkpoint, self._note).take()
         await checkpoint()
         self.takes_views = False
         return await conclude(self._folder, log)

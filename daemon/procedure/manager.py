@@ -5,8 +5,10 @@ import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from calib import Calibration
+from calib.observations import Observation
 from daemon.errors import RigFaultError, RunActiveError, RunStateError, StoreError
 from daemon.lease import Lease, LeaseDesk
 from daemon.procedure.assignment import Assignment, Calibrate, Solve
@@ -22,23 +24,25 @@ from daemon.store import CalibrationRecord, RunRecord, RunState, Store
 logger = logging.getLogger(__name__)
 
 Activate = Callable[[CalibrationRecord, Calibration], None]
+Seen = Callable[[str, str, Observation], None]
 
 
 class RunManager(RunBook):
     """Starts and steers runs.
 
     `activate` is called with the calibration of a run that has succeeded, before its last event is told; `told`
-    with every event.
+    with every event; `seen` with what was found in a picture, by the run's id and the picture's name.
     """
 
     def __init__(
-        self, rig: Rig, leases: LeaseDesk, store: Store, activate: Activate, told: Told | None = None
+        self, rig: Rig, leases: LeaseDesk, store: Store, activate: Activate, told: Told, seen: Seen
     ) -> None:
         super().__init__(store)
         self._rig = rig
         self._leases = leases
         self._activate = activate
         self._told = told
+        self._seen = seen
         self._starting = asyncio.Lock()
         self._closed = False
         self._stops = 0
@@ -67,7 +71,9 @@ class RunManager(RunBook):
                 await self._store.add_run(record)
                 return EventLog(record.id, folder)
 
-            return await self._begin(record, Calibrate(self._rig, folder, starts), take_up, token)
+            return await self._begin(
+                record, Calibrate(self._rig, folder, partial(self._seen, record.id), starts), take_up, token
+            )
 
     async def resume(self, run_id: str, token: str | None = None) -> RunRecord:
         """Let a paused run go on; take up one that ended before its time after the last sweep that it finished.
@@ -84,7 +90,8 @@ class RunManager(RunBook):
             before = await self._require_unfinished(run_id)
             self._require_able()
             require_same_profile(before, self._rig.profile)
-            assignment = Calibrate(self._rig, self._store.session_folder(before))
+            folder = self._store.session_folder(before)
+            assignment = Calibrate(self._rig, folder, partial(self._seen, run_id))
             return await self._begin(before, assignment, lambda: self._take_up(before), token)
 
     async def solve(self, run_id: str, left_out: Sequence[int] = ()) -> RunRecord:
@@ -151,8 +158,7 @@ class RunManager(RunBook):
         )
         with handing_over as lease:
             log = await take_up()
-        if self._told is not None:
-            log.listen(self._told)
+        log.listen(self._told)
         running = replace(record, state=RunState.RUNNING, ended_at=None, error=None)
         self._latest = Run(running, assignment, log, self._store, self._end_of(lease))
         self._latest.start()

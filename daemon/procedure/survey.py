@@ -1,7 +1,7 @@
 """The measuring half of a run: homing, sweeps and free views, each view on disk before the next move."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -12,6 +12,7 @@ from calib.second_look import partly_seen
 from calib.session import Session
 from calib.session_writer import Picture, SessionWriter
 from daemon.errors import TargetUnseenError
+from daemon.procedure.assignment import Checkpoint, Note
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Homing, JointStarted, Moving, Planned, Use, ViewTaken, Warned
 from daemon.procedure.observation import Observation, Observer, Taken, find, find_where_predicted
@@ -25,22 +26,23 @@ MOST_KEPT = 8
 FEWEST_VIEWS = 2
 """Positions of a fit sweep at which the target must be seen: one shows no motion of the joint."""
 
-Checkpoint = Callable[[], Awaitable[None]]
-
 
 class Survey:
     """Takes the views of the profile's procedure that the session lacks.
 
     A session that has views already goes on after its last finished sweep, once all axes have been homed anew. Its
     `starts` say which sweeps begin elsewhere than planned.
-    `checkpoint` is awaited before each position.
+    `checkpoint` is awaited before each position; `note` is called with what is found in each picture by itself.
     """
 
-    def __init__(self, rig: Rig, writer: SessionWriter, log: EventLog, checkpoint: Checkpoint) -> None:
+    def __init__(
+        self, rig: Rig, writer: SessionWriter, log: EventLog, checkpoint: Checkpoint, note: Note
+    ) -> None:
         self._rig = rig
         self._writer = writer
         self._log = log
         self._checkpoint = checkpoint
+        self._note = note
         self._observer = Observer(rig)
         self._procedure = rig.profile.procedure.starting(writer.session.starts)
         self._positions = sum(1 for _ in self._procedure.planned_views())
@@ -118,7 +120,8 @@ class Survey:
                 if not first:  # a picture can be spoilt by what passes by; a second one tells
                     self._unseen.append(_Unseen(spot, taken, str(error)))
             else:
-                await self._store(observation, spot)
+                picture = await self._store(observation, spot)
+                self._note(picture, self._seen[-1])
                 self._remarks.warn(observation, spot)
                 return True
         if len(self._unseen) > MOST_KEPT:
@@ -154,7 +157,8 @@ class Survey:
     def _leave_out(self, unseen: "_Unseen") -> None:
         self._remarks.leave_out(unseen.spot, unseen.problem)
 
-    async def _store(self, observation: Observation, spot: Spot) -> None:
+    async def _store(self, observation: Observation, spot: Spot) -> str:
+        """Put a view on disk and tell of it; return its picture's name."""
         taken, detection = observation.taken, observation.seen.detection
         fields: dict[str, Any] = {
             "joint": spot.joint,
@@ -181,6 +185,7 @@ class Survey:
                 image=view.image,
             )
         )
+        return view.image
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from daemon.api.judging_documents import TablesDocument
 from daemon.service import Service
 from daemon.store import RunRecord, RunState
 from tests.calib.test_paper_tables import noisy_session
-from tests.daemon.judged import asked
+from tests.daemon.judged import asked, forget
 from tests.daemon.runs import finish
 
 
@@ -71,6 +71,7 @@ async def test_residuals_of_a_run_whose_pictures_are_gone_are_refused_in_words(
     client: httpx.AsyncClient, service: Service, run: RunRecord
 ) -> None:
     path = f"/calibrations/{run.calibration_id}/residuals"
+    forget(service)
     (service.store.session_folder(run) / "frames" / "0002.png").unlink()
     refused = await client.get(path)
     assert (refused.status_code, refused.json()["code"]) == (409, "session_unreadable")

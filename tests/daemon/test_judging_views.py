@@ -13,6 +13,7 @@ from calib import load_session
 from daemon.procedure.assignment import UNSOLVED
 from daemon.service import Service
 from daemon.store import RunRecord, RunState
+from tests.daemon.judged import forget
 from tests.daemon.runs import finish
 
 
@@ -78,6 +79,22 @@ async def test_the_coverage_of_a_run_grows_with_its_views(
     assert (await client.get("/runs/none/coverage")).json()["code"] == "unknown_run"
 
 
+async def test_what_a_run_has_seen_is_not_looked_for_again(
+    client: httpx.AsyncClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = await service.runs.start()
+    async for event in service.runs.events(started.id):
+        if event.type == "view" and event.view == 5:
+            await service.runs.cancel(started.id)
+    with monkeypatch.context() as patch:
+        patch.setattr("daemon.judging.sightings.observe", lambda *_, **__: pytest.fail("it was looked for"))
+        known = await views(client, started)
+        covered = (await client.get(f"/runs/{started.id}/coverage")).json()
+    forget(service)
+    assert await views(client, started) == known
+    assert (await client.get(f"/runs/{started.id}/coverage")).json() == covered
+
+
 async def test_the_target_is_looked_for_once_in_each_picture(
     client: httpx.AsyncClient, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,6 +102,7 @@ async def test_the_target_is_looked_for_once_in_each_picture(
     async for event in service.runs.events(started.id):
         if event.type == "view" and event.view == 2:
             await service.runs.cancel(started.id)
+    forget(service)
     first = await views(client, started)
     monkeypatch.setattr("daemon.judging.sightings.observe", lambda *_, **__: pytest.fail("it was looked for"))
     assert await views(client, started) == first

@@ -55,7 +55,9 @@ async def test_a_node_without_a_heartbeat_is_dead_although_it_answers() -> None:
     async with opened(silence=f"{SILENCE} s") as rig:
         rig.emulator.stop_heartbeat("slide")
         began = rig.clock.now()
-        with pytest.raises(DeviceLostError, match=r"axis 'slide': the drive at node 1 .* no heartbeat for \d"):
+        with pytest.raises(
+            DeviceLostError, match=r"axis 'slide': the drive at node 1 .* no heartbeat for \d"
+        ):
             await read_until_lost(rig, rig.slide)
         assert rig.clock.now() - began >= SILENCE / 2
         await rig.pan.read()
