@@ -1,6 +1,10 @@
 """The report: it says what is known and not more, the same each time, needs nothing from elsewhere, and can be read."""
 
 import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -246,6 +250,47 @@ def test_one_that_is_made_apart_is_the_same_and_an_error_there_is_one_here(
     with pytest.raises(ExportError, match="an error in the program"):
         made_apart("html", replace(subject, verification="[]"))
     assert "ValidationError" in caplog.text
+
+
+SLEEPING = """
+import time
+from daemon.export.making_reports import made_apart
+
+class Sleeping:
+    def __reduce__(self):
+        return time.sleep, (600,)
+
+made_apart("pdf", Sleeping())
+"""
+
+
+def test_one_that_nobody_waits_for_any_more_ends() -> None:
+    with subprocess.Popen([sys.executable, "-c", SLEEPING]) as daemon:
+        (making,) = within_a_minute(lambda: children_of(daemon.pid))
+        daemon.kill()
+    within_a_minute(lambda: not is_alive(making))
+
+
+def within_a_minute(found: Callable[[], Any]) -> Any:
+    end = time.monotonic() + 60
+    while not (value := found()):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    return value
+
+
+def children_of(pid: int) -> list[int]:
+    """Return those of a process that is there."""
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for task in tasks for child in task.read_text().split()]
+
+
+def is_alive(pid: int) -> bool:
+    """Return whether a process is there, and has not only not been asked after since it ended."""
+    try:
+        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
 
 
 def test_the_same_calibration_makes_the_same_files(subject: Subject) -> None:
