@@ -129,7 +129,8 @@ class Client:
     ) -> Run:
         """Start a calibration run; whoever holds the lease hands it over.
 
-        The first sweep of each of the joints `from_here` starts from where the axes stand.
+        The first sweep of each of the joints `from_here` starts from where the axes stand, and so do its others that
+        would start from the same place.
         """
         headers = None if lease is None else lease.headers
         body = {"owner": owner, "note": note, "from_here": list(from_here)}

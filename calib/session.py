@@ -160,7 +160,7 @@ class Session(Document):
     sweeps_done: Annotated[int, Field(ge=0)] = 0
     """How many sweeps of a run's procedure are finished: it is resumed after them."""
     starts: dict[str, list[Number]] = Field(default_factory=dict)
-    """Where all axes stood as the first sweep of a joint began, by joint, where a person said from where."""
+    """Where all axes stood as the sweep of a joint began, by joint, where a person said from where."""
     set_aside: list[View] = Field(default_factory=list)
     """Views of a sweep that was cut off, which the run took again when it was resumed; they are not used."""
 

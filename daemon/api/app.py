@@ -40,7 +40,7 @@ from daemon.api.security import describe_roles
 from daemon.api.wrong_requests import forget_wrong_requests
 from daemon.service import Service
 
-API_VERSION: Final = "1.6.2"
+API_VERSION: Final = "1.6.3"
 """Of the API, not of activecam: docs/reference/openapi.json is the description of this one."""
 
 DESCRIPTION: Final = """

@@ -19,7 +19,7 @@ FromHere = Annotated[
     list[str],
     Query(
         max_length=100,
-        description="A joint whose first sweep is to start from where the axes stand now; may be repeated.",
+        description="A joint whose sweep is to start from where the axes stand now; may be repeated.",
     ),
 ]
 PROBLEMS = answers(UnknownAxisError, NotHomedError, LimitError)
@@ -41,7 +41,7 @@ class PlanDocument(BaseModel):
     views: int = Field(description="Pictures to take.")
     seconds: float = Field(description="About how long that takes, without homing and solving.")
     joints: list[str] = Field(description="The joints, in the order of their sweeps.")
-    from_here: list[str] = Field(description="Those whose first sweep starts from where the axes stand.")
+    from_here: list[str] = Field(description="Those whose sweep starts from where the axes stand.")
     positions: list[PositionDocument]
 
 

@@ -43,7 +43,7 @@ class RunRequest(RequestBody):
         list[str],
         Field(
             max_length=100,
-            description="Joints whose first sweep starts from where the axes stand now.",
+            description="Joints whose sweep starts from where the axes stand now.",
             examples=[["pan"]],
         ),
     ] = []  # noqa: RUF012  pydantic copies it
@@ -131,7 +131,8 @@ async def start_run(
     needs none beforehand; the holder of the lease hands it over by showing its token in `X-Lease`.
 
     With `from_here` the first sweep of these joints starts from where all axes stand now, instead of where the profile
-    says; the joint itself goes through the positions of the profile.
+    says, and so do their others that it starts from the same place; the joint itself goes through the positions of
+    the profile.
     """
     request = request or RunRequest()
     run = await service.runs.start(request.owner, request.note, token, request.from_here)

@@ -28,7 +28,7 @@ export function mountPlan(element, page, signal, changed) {
   const fromHere = h(
     "fieldset",
     { class: "bare" },
-    h("legend", {}, "Start a joint’s first sweep from where the other axes stand now"),
+    h("legend", {}, "Start a joint’s sweep from where the other axes stand now"),
     choices,
     problem,
   );

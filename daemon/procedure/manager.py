@@ -54,9 +54,9 @@ class RunManager(RunBook):
     ) -> RunRecord:
         """Start the profile's whole procedure; `token` shows the starter's lease, if there is one.
 
-        The first sweep of each of the joints `from_here` starts from where the axes stand now. Before anything moves,
-        raises RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError and StoreError; and for
-        those joints what `starts_here` raises, and AxisBusyError.
+        Sweeps of the joints `from_here` start from where the axes stand now, as `Procedure.starting` has it. Before
+        anything moves, raises RunActiveError, RunStateError, StopLatchedError, RigFaultError, LeaseHeldError and
+        StoreError; and for those joints what `starts_here` raises, and AxisBusyError.
         """
         async with self._starting:
             await self.settle()

@@ -61,20 +61,22 @@ class Procedure:
     views: tuple[FreeView, ...]
 
     def starting(self, starts: Mapping[str, Sequence[float]]) -> "Procedure":
-        """Return this procedure with the first sweep of some joints begun elsewhere.
+        """Return this procedure with sweeps of some joints begun elsewhere.
 
         `starts` says by joint where all axes stand then, in chain order; the joint itself still begins where it would.
+        That goes for its first sweep and for all that begin where the first one does, as the one that verifies it may:
+        what has been put out of sight there is so for all of them.
         """
-        left, sweeps = dict(starts), []
+        firsts: dict[str, Readings] = {}
+        sweeps = []
         for sweep in self.sweeps:
-            readings = left.pop(sweep.joint, None)
-            if readings is None:
-                sweeps.append(sweep)
-            else:
-                there = dict(zip(sweep.start, readings, strict=True)) | {
-                    sweep.joint: sweep.start[sweep.joint]
-                }
+            others = {name: reading for name, reading in sweep.start.items() if name != sweep.joint}
+            if sweep.joint in starts and firsts.setdefault(sweep.joint, others) == others:
+                there = dict(zip(sweep.start, starts[sweep.joint], strict=True))
+                there[sweep.joint] = sweep.start[sweep.joint]
                 sweeps.append(replace(sweep, start=MappingProxyType(there)))
+            else:
+                sweeps.append(sweep)
         return replace(self, sweeps=tuple(sweeps))
 
     def planned_views(self) -> Iterator[PlannedView]:

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -82,6 +83,22 @@ async def test_a_sweep_starts_from_where_the_axes_stand(client: httpx.AsyncClien
         assert view.readings == pytest.approx(position["readings"], abs=0.05)
     # The pan goes down to its first position as it would have from the profile's start.
     assert [view.approached[1] for view in session.views[4:8] if view.approached] == [-1, 1, 1, 1]
+
+
+def test_sweeps_that_start_from_the_same_place_do_so_from_here_too(tmp_path: Path) -> None:
+    procedure = small_rig(tmp_path).procedure
+    slide, pan = procedure.sweeps
+    backwards = replace(pan, readings=pan.readings[::-1], start={**pan.start, "pan": 12.0}, use="verify")
+    from_elsewhere = replace(pan, start={**pan.start, "slide": 20.0})
+    sweeps = (slide, pan, backwards, from_elsewhere)
+    started = replace(procedure, sweeps=sweeps).starting({"pan": [60.0, 3.0]}).sweeps
+    assert [dict(sweep.start) for sweep in started] == [
+        {"slide": 0.0, "pan": 0.0},
+        {"slide": 60.0, "pan": -12.0},
+        {"slide": 60.0, "pan": 12.0},
+        {"slide": 20.0, "pan": -12.0},
+    ]
+    assert [sweep.readings for sweep in started] == [sweep.readings for sweep in sweeps]
 
 
 async def test_a_run_that_is_resumed_starts_its_sweeps_from_where_it_was_told(service: Service) -> None:
