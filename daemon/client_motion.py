@@ -2,47 +2,48 @@
 
 import asyncio
 import logging
-from collections.abc import Collection, Coroutine
+from collections.abc import Callable, Collection, Coroutine
 from typing import Any
 
 from daemon.errors import DaemonError
 from daemon.lease import Lease, LeaseDesk
 from daemon.operation.log_fields import log_fields
-from daemon.rig import Rig
+from daemon.rig import Permit, Rig
 from drivers.errors import AxisBusyError, DriverError, MotionStoppedError
 
 logger = logging.getLogger(__name__)
 
+Motion = Callable[[Permit], Coroutine[Any, Any, None]]
+"""What is to move, as long as it is permitted."""
+
 
 class ClientMotions:
-    """Homing, moves and jogs under way, by the lease's token."""
+    """Homing, moves and jogs under way, by the lease's token, with the axes of each."""
 
     def __init__(self, rig: Rig, leases: LeaseDesk) -> None:
         self._rig = rig
         self._leases = leases
-        self._under_way: dict[str, set[asyncio.Task[None]]] = {}
+        self._under_way: dict[str, dict[asyncio.Task[None], Collection[str]]] = {}
         self._beginning: set[str] = set()
         """Axes of motions whose first steps are still to be taken."""
         leases.on_end(self._stop)
 
-    async def begin(
-        self, lease: Lease, axes: Collection[str], motion: Coroutine[Any, Any, None]
-    ) -> asyncio.Task[None]:
-        """Begin a motion of `axes` that is cancelled, and so stopped, when `lease` ends.
+    async def begin(self, lease: Lease, axes: Collection[str], motion: Motion) -> asyncio.Task[None]:
+        """Begin a motion of `axes` that is cancelled, and so stopped, when `lease` ends; nothing is sent after that.
 
         Returns when one of `axes` moves or the motion is over; raises what kept it from beginning, and
         LeaseEndedError or LeaseHeldError where the lease is over already.
         """
-        try:
+
+        def permit() -> None:
             self._leases.require(lease.token)
-            self._require_none_beginning(axes)
-        except (DaemonError, DriverError):
-            motion.close()
-            raise
+
+        permit()
+        self._require_none_beginning(axes)
         with log_fields(axis=" ".join(axes)):
-            task = asyncio.create_task(motion)
+            task = asyncio.create_task(motion(permit))
             task.add_done_callback(lambda done: self._finished(lease.token, done))
-        self._under_way.setdefault(lease.token, set()).add(task)
+        self._under_way.setdefault(lease.token, {})[task] = axes
         self._beginning.update(axes)
         try:
             await self._begun(task, axes)
@@ -81,12 +82,14 @@ class ClientMotions:
             raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
 
     def _stop(self, lease: Lease) -> None:
-        for task in self._under_way.get(lease.token, ()):
+        for task, axes in self._under_way.get(lease.token, {}).items():
             task.cancel()
+            # A cancellation takes turns of the loop to come through, in which a command would be sent.
+            self._rig.call_off(axes)
 
     def _finished(self, token: str, task: asyncio.Task[None]) -> None:
         tasks = self._under_way[token]
-        tasks.discard(task)
+        del tasks[task]
         if not tasks:
             del self._under_way[token]
         if task.cancelled() or (error := task.exception()) is None:

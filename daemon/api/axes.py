@@ -1,7 +1,8 @@
 """Routes that move axes. All positions and distances are in the axis's own reading unit."""
 
-from collections.abc import Collection, Coroutine
-from typing import Annotated, Any
+from collections.abc import Collection
+from functools import partial
+from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Response
 from pydantic import Field
@@ -11,6 +12,7 @@ from daemon.api.dependencies import LeaseDep, ServiceDep
 from daemon.api.once import KEYED, ONCE, OnceRoute
 from daemon.api.problems import answers
 from daemon.api.rig_documents import AxisDocument
+from daemon.client_motion import Motion
 from daemon.errors import (
     LeaseEndedError,
     LeaseHeldError,
@@ -89,7 +91,9 @@ async def move_axes(
 ) -> list[AxisDocument]:
     """Check every axis's limits and homing before any of them moves; when one fails, all are stopped."""
     service.rig.check_move(request.targets)
-    await _begin(service, lease, request.targets, service.rig.move(request.targets), response, wait=wait)
+    await _begin(
+        service, lease, request.targets, partial(service.rig.move, request.targets), response, wait=wait
+    )
     return [AxisDocument.of(service.rig.axis(name)) for name in request.targets]
 
 
@@ -99,7 +103,7 @@ async def home_axis(
 ) -> AxisDocument:
     """Let the axis find its zero, after which its readings mean something."""
     service.rig.check_home(name)
-    await _begin(service, lease, [name], service.rig.home(name), response, wait=wait)
+    await _begin(service, lease, [name], partial(service.rig.home, name), response, wait=wait)
     return AxisDocument.of(service.rig.axis(name))
 
 
@@ -115,7 +119,7 @@ async def move_axis(
     """Go to `target`; the axis must be homed, and the target within its limits."""
     targets = {name: request.target}
     service.rig.check_move(targets)
-    await _begin(service, lease, targets, service.rig.move(targets), response, wait=wait)
+    await _begin(service, lease, targets, partial(service.rig.move, targets), response, wait=wait)
     return AxisDocument.of(service.rig.axis(name))
 
 
@@ -125,7 +129,9 @@ async def jog_axis(
 ) -> AxisDocument:
     """Go by `distance`, homed or not; a homed axis keeps to its limits. Ends with the lease."""
     service.rig.check_jog(name, request.distance)
-    await _begin(service, lease, [name], service.rig.jog(name, request.distance), response, wait=wait)
+    await _begin(
+        service, lease, [name], partial(service.rig.jog, name, request.distance), response, wait=wait
+    )
     return AxisDocument.of(service.rig.axis(name))
 
 
@@ -140,7 +146,7 @@ async def _begin(
     service: Service,
     lease: Lease,
     axes: Collection[str],
-    motion: Coroutine[Any, Any, None],
+    motion: Motion,
     response: Response,
     *,
     wait: bool,

@@ -10,6 +10,7 @@ In the order in which a state travels:
     rig               all of it together
 """
 
+from daemon.rig.controller_owner import Permit
 from daemon.rig.devices import Devices, make_devices
 from daemon.rig.history import PastReadings
 from daemon.rig.rig import Rig
@@ -20,6 +21,7 @@ __all__ = [
     "DeviceSnapshot",
     "Devices",
     "PastReadings",
+    "Permit",
     "Rig",
     "RigSnapshot",
     "Side",

@@ -22,6 +22,12 @@ POLL_PERIOD: Final = 0.02
 """Seconds of life between two readings of an axis."""
 
 Action = Callable[[Axis], Awaitable[None]]
+Permit = Callable[[], object]
+"""Raises what forbids a motion; asked at the last moment before its command is sent."""
+
+
+def freely() -> None:
+    """Forbid nothing."""
 
 
 @dataclass(slots=True)
@@ -92,19 +98,48 @@ class ControllerOwner(DeviceOwner):
         if self._axes[name].motion is not None:
             raise AxisBusyError(f"axis '{name}' is moving: wait for it or stop it before the next motion")
 
-    async def home(self, name: str) -> None:
+    def call_off(self, name: str) -> None:
+        """Cancel an axis's motion, if there is one, at once: if its command has not been sent yet, it is not."""
+        motion = self._axes[name].motion
+        if motion is not None:
+            motion.cancel()
+
+    async def home(self, name: str, permit: Permit = freely) -> None:
         """Home one axis; after that its position is believed again."""
-        await self._carry_out(name, lambda axis: axis.home())
+        await self.carry_out(name, lambda axis: axis.home(), permit)
         self._axes[name].must_home, self._axes[name].approached = False, 0
         self._publish()
 
-    async def carry_out(self, name: str, action: Action) -> None:
+    async def carry_out(self, name: str, action: Action, permit: Permit = freely) -> None:
         """Run one motion of one axis to its confirmed standstill.
 
         Cancelling stops the axis, and goes on only when it stands. Raises what the driver raises, and
-        StopLatchedError, DeviceLostError and AxisBusyError before anything is sent.
+        StopLatchedError, DeviceLostError, AxisBusyError and what `permit` raises before anything is sent.
         """
-        await self._carry_out(name, action)
+        self.require_idle(name)
+        self._latch.require_free()
+        record = self._axes[name]
+        with log_fields(axis=name):
+            motion = asyncio.ensure_future(self._act(name, action, permit))
+        record.motion, record.last_error = motion, None
+        self._publish()
+        try:
+            await _watch(motion)
+            if motion.cancelled() and self.lost is not None:
+                raise DeviceLostError(because(f"axis '{name}'", "did not reach its target", self.lost))
+            if motion.cancelled():
+                raise MotionStoppedError(f"axis '{name}' was stopped before the motion reached its target")
+            motion.result()
+        except asyncio.CancelledError:
+            record.last_error = f"the motion of axis '{name}' was cancelled before its target"
+            raise
+        except DriverError as error:
+            record.last_error = str(error)
+            raise
+        finally:
+            record.motion = None
+            self.poll_soon()
+            self._publish()
 
     async def stop(self, names: Iterable[str]) -> dict[str, str]:
         """Stop axes at once, past every motion under way, and wait until they stand.
@@ -127,34 +162,9 @@ class ControllerOwner(DeviceOwner):
             if isinstance(result, Exception)
         }
 
-    async def _carry_out(self, name: str, action: Action) -> None:
-        self.require_idle(name)
-        self._latch.require_free()
-        record = self._axes[name]
-        with log_fields(axis=name):
-            motion = asyncio.ensure_future(self._act(name, action))
-        record.motion, record.last_error = motion, None
-        self._publish()
-        try:
-            await _watch(motion)
-            if motion.cancelled() and self.lost is not None:
-                raise DeviceLostError(because(f"axis '{name}'", "did not reach its target", self.lost))
-            if motion.cancelled():
-                raise MotionStoppedError(f"axis '{name}' was stopped before the motion reached its target")
-            motion.result()
-        except asyncio.CancelledError:
-            record.last_error = f"the motion of axis '{name}' was cancelled before its target"
-            raise
-        except DriverError as error:
-            record.last_error = str(error)
-            raise
-        finally:
-            record.motion = None
-            self.poll_soon()
-            self._publish()
-
-    async def _act(self, name: str, action: Action) -> None:
+    async def _act(self, name: str, action: Action, permit: Permit) -> None:
         self._latch.require_free()  # a stop since the motion was asked for is only on its way to the device
+        permit()
         record = self._axes[name]
         began, side = record.state, record.approached
         record.approached = 0

@@ -1,7 +1,7 @@
 """The rig: every axis and the camera, as one thing that moves, stands, and knows where it is."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Self
 
@@ -10,7 +10,7 @@ from daemon.errors import StaleReadingError, StandstillError, UnknownAxisError
 from daemon.operation.log_fields import log_fields
 from daemon.profile import Profile
 from daemon.rig.camera_owner import CameraOwner
-from daemon.rig.controller_owner import Action, ControllerOwner
+from daemon.rig.controller_owner import Action, ControllerOwner, Permit, freely
 from daemon.rig.devices import Devices, make_devices
 from daemon.rig.history import PastReadings, ReadingHistory
 from daemon.rig.snapshot import AxisSnapshot, RigSnapshot
@@ -28,7 +28,8 @@ class Rig:
 
     Positions, targets and distances are in each axis's reading unit. `snapshot` is the latest state of all
     axes; `changed` fires whenever it is replaced; `utc` turns its time stamps into UTC. A motion returns when
-    the axes stand at its end; cancelling it stops the axes first. No method resends a motion.
+    the axes stand at its end; cancelling it stops the axes first. Its `permit` is asked just before each command is
+    sent, and what it raises is raised. No method resends a motion.
     """
 
     def __init__(self, profile: Profile, devices: Devices) -> None:
@@ -131,7 +132,7 @@ class Rig:
         self.specs[name].check_jog(distance, axis.position if axis.homed else None)
         self._require_ready([name])
 
-    async def move(self, targets: Mapping[str, float]) -> None:
+    async def move(self, targets: Mapping[str, float], permit: Permit = freely) -> None:
         """Move several axes at once, each to its target, and return when all of them stand there.
 
         The limits of all of them are checked, and all must be homed, before any of them moves. When one of
@@ -140,17 +141,22 @@ class Rig:
         AxisBusyError and DeviceLostError; after that, what `Axis.move` raises.
         """
         self.check_move(targets)
-        await self._together({name: _move_to(target) for name, target in targets.items()})
+        await self._together({name: _move_to(target) for name, target in targets.items()}, permit)
 
-    async def home(self, name: str) -> None:
+    async def home(self, name: str, permit: Permit = freely) -> None:
         """Home one axis; raises as `move` does."""
         self.check_home(name)
-        await self._owner_of[name].home(name)
+        await self._owner_of[name].home(name, permit)
 
-    async def jog(self, name: str, distance: float) -> None:
+    async def jog(self, name: str, distance: float, permit: Permit = freely) -> None:
         """Move one axis by `distance`, homed or not; raises as `move` does."""
         self.check_jog(name, distance)
-        await self._owner_of[name].carry_out(name, lambda axis: axis.jog(distance))
+        await self._owner_of[name].carry_out(name, lambda axis: axis.jog(distance), permit)
+
+    def call_off(self, names: Iterable[str]) -> None:
+        """Cancel the motions of these axes at once: none of them sends a command any more but its stop."""
+        for name in names:
+            self._owner_of[name].call_off(name)
 
     async def stop(self, reason: str) -> None:
         """Latch, stop everything at once past every motion and queue, and return when all axes stand.
@@ -246,11 +252,11 @@ class Rig:
             why = "" if axis.fault is None else f" ({axis.fault})"
             raise NotHomedError(f"axis '{name}' is not homed{why}: home it before moving it to a position")
 
-    async def _together(self, actions: Mapping[str, Action]) -> None:
+    async def _together(self, actions: Mapping[str, Action], permit: Permit) -> None:
         try:
             async with asyncio.TaskGroup() as motions:
                 for name, action in actions.items():
-                    motions.create_task(self._owner_of[name].carry_out(name, action))
+                    motions.create_task(self._owner_of[name].carry_out(name, action, permit))
         except BaseExceptionGroup as failures:
             # The first failure is the cause; the others are axes that were stopped because of it.
             raise failures.exceptions[0] from None

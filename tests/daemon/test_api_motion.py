@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ async def test_nothing_begins_under_a_lease_that_has_ended_meanwhile(service: Se
     lease = service.leases.acquire("anna", "", 60)
     service.leases.release(lease.token)
     with pytest.raises(LeaseEndedError):
-        await service.motions.begin(lease, ["pan"], service.rig.jog("pan", 1.0))
+        await service.motions.begin(lease, ["pan"], partial(service.rig.jog, "pan", 1.0))
     assert not service.rig.snapshot.moving
 
 

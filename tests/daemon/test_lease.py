@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from functools import partial
 
 import pytest
 
@@ -125,5 +126,5 @@ async def test_nothing_begins_under_one_that_is_over(service: Service) -> None:
     lease = service.leases.acquire("anna", "", 30.0)
     service.leases.release(lease.token)
     with pytest.raises(LeaseEndedError):
-        await service.motions.begin(lease, ["slide"], service.rig.jog("slide", 1.0))
+        await service.motions.begin(lease, ["slide"], partial(service.rig.jog, "slide", 1.0))
     assert not service.rig.snapshot.moving

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import AsyncIterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -129,7 +130,7 @@ async def test_what_cannot_start_from_here_is_refused_before_anything_moves(
     assert await refused("tilt") == (404, "unknown_axis")
     assert (await client.get("/runs/checklist", params={"from_here": "tilt"})).status_code == 404
     lease = service.leases.acquire("anna", "", 60)
-    moving = await service.motions.begin(lease, ["slide"], service.rig.move({"slide": 100.0}))
+    moving = await service.motions.begin(lease, ["slide"], partial(service.rig.move, {"slide": 100.0}))
     answer = await client.post("/runs", json={"from_here": ["pan"]}, headers={"X-Lease": lease.token})
     assert (answer.status_code, answer.json()["code"]) == (409, "axis_busy")
     await service.motions.ended(moving)

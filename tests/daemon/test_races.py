@@ -1,6 +1,8 @@
 """What may come at the same moment, and is to end as if one had come after the other."""
 
 import asyncio
+from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +10,10 @@ import httpx
 import pytest
 
 from daemon.profile import Profile
+from daemon.rig import Devices
 from daemon.service import Service, running_service
 from daemon.store import CalibrationRecord, RunRecord, RunState
+from drivers.axis import Axis
 from tests.daemon.motions import home_all
 from tests.daemon.snapshots import VERSIONS, restore_snapshot
 
@@ -56,7 +60,7 @@ async def test_who_acknowledges_a_stop_while_the_daemon_ends_moves_nothing(
 ) -> None:
     await home_all(service.rig)
     lease = service.leases.acquire("anna", "", 60.0)
-    await service.motions.begin(lease, ["slide"], service.rig.move({"slide": 90.0}))
+    await service.motions.begin(lease, ["slide"], partial(service.rig.move, {"slide": 90.0}))
     engaged = asyncio.Event()
     service.rig.latch.on_engage(lambda _: engaged.set())
     ending = asyncio.create_task(service.halt())
@@ -67,4 +71,39 @@ async def test_who_acknowledges_a_stop_while_the_daemon_ends_moves_nothing(
     token = (await client.post("/lease", json={"owner": "bert", "note": "", "ttl_s": 60})).json()["token"]
     refused = await client.post("/axes/slide/jog", json={"distance": 1.0}, headers={"X-Lease": token})
     assert refused.json()["code"] == "stop_latched"
+    assert not service.rig.snapshot.moving
+
+
+@pytest.mark.parametrize("waits", range(4))
+@pytest.mark.parametrize("turns", range(12))
+async def test_nothing_is_sent_once_the_lease_has_ended(
+    service: Service, devices: Devices, monkeypatch: pytest.MonkeyPatch, turns: int, waits: int
+) -> None:
+    """However far the motion has come by then; a driver may still wait for its port."""
+    await home_all(service.rig)
+    sent: list[float] = []
+
+    def noted(axis: Axis) -> Callable[[float], Awaitable[None]]:
+        move = axis.move
+
+        async def noting(target: float) -> None:
+            for _ in range(waits):
+                await asyncio.sleep(0)
+            sent.append(target)
+            await move(target)
+
+        return noting
+
+    for controller in devices.controllers.values():
+        for axis in controller.axes.values():
+            monkeypatch.setattr(axis, "move", noted(axis))
+    lease = service.leases.acquire("anna", "", 60.0)
+    move = partial(service.rig.move, {"slide": 90.0, "pan": 9.0})
+    beginning = asyncio.create_task(service.motions.begin(lease, ["slide", "pan"], move))
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    service.leases.release(lease.token)
+    before = list(sent)
+    await asyncio.gather(beginning, service.motions.stopped(lease), return_exceptions=True)
+    assert sent == before
     assert not service.rig.snapshot.moving

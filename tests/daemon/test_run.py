@@ -1,6 +1,7 @@
 """A whole run in process: begun, paused, cancelled."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -132,7 +133,7 @@ async def test_a_run_whose_start_is_not_stored_leaves_its_starter_the_lease_and_
 
     monkeypatch.setattr(service.store, "add_run", full)
     lease = service.leases.acquire("anna", "", 60)
-    jog = await service.motions.begin(lease, ["slide"], service.rig.jog("slide", 90.0))
+    jog = await service.motions.begin(lease, ["slide"], partial(service.rig.jog, "slide", 90.0))
     with pytest.raises(StoreError):
         await service.runs.start(token=lease.token)
     assert service.leases.current == lease

@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -132,7 +133,7 @@ async def test_an_alarm_while_the_axes_stand_fails_the_run_in_its_words(
 
 async def test_a_run_waits_until_what_its_starter_has_moved_stands(service: Service) -> None:
     lease = service.leases.acquire("anna", "", 60)
-    jog = await service.motions.begin(lease, ["slide"], service.rig.jog("slide", 90.0))
+    jog = await service.motions.begin(lease, ["slide"], partial(service.rig.jog, "slide", 90.0))
     run, _ = await finish(service, await service.runs.start(token=lease.token))
     assert (run.state, run.error) == (RunState.SUCCEEDED, None)
     assert jog.cancelled()
