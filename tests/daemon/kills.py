@@ -41,8 +41,9 @@ LATE = 0.05
 
 @dataclass
 class Told:
-    """What a daemon has told until it was killed."""
+    """What a daemon that was to do `action` has told until it was killed."""
 
+    action: Action = "start"
     up: bool = False
     """Whether it had started."""
     unfinished: list[str] = field(default_factory=list)
@@ -59,8 +60,9 @@ class Told:
 
     @property
     def concluding(self) -> bool:
-        """Whether the end may have been stored without having been told."""
-        return bool(of(self.events, "solved")) and not self.finished
+        """Whether the end may have been stored without having been told: what has too few views fails at once."""
+        at_once = self.action == "solve" and bool(self.events) and self.events[-1].type == "state"
+        return (at_once or bool(of(self.events, "solved"))) and not self.finished
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def kill_one(folder: Path, data: Path, asked: Asked, moment: int, late: float) -
     process = PROCESSES.Process(target=live, args=(folder, data, asked, there))
     process.start()
     there.close()
-    told = Told()
+    told = Told(asked.action)
     while not (told.up and len(told.events) >= moment) and _hear(here, told):
         pass
     time.sleep(late)

@@ -30,21 +30,29 @@ POSES: Final = 20
 POSITION, ROTATION = 3e-4, 5e-4
 """Metres and radians that a pose may be off."""
 
-# Of what a rig takes its time for there is less. Pictures, which are rendered while axes move, are fewer, and the
-# larger ones smaller, but of a larger board; axes are faster and stand sooner; some views are left out.
+# Of what a rig takes its time for there is less. Pictures, which are rendered while axes move, are fewer and smaller, but
+# of a larger board; axes are faster and stand sooner; some views are left out.
 PATIENT = ("[procedure]", '[procedure]\nframe_timeout = "60 s"')
 FEWER_PICTURES = ('frame_rate = "10 Hz"', 'frame_rate = "5 Hz"')
 CHANGES = {
     "grbl-table": (
         PATIENT,
         FEWER_PICTURES,
+        ("width = 960", "width = 640"),
+        ("height = 720", "height = 480"),
+        ('fx = "905 px"', 'fx = "603 px"'),
+        ('fy = "903 px"', 'fy = "602 px"'),
+        ('cx = "487 px"', 'cx = "324.7 px"'),
+        ('cy = "352 px"', 'cy = "234.7 px"'),
+        ('pitch = "30 mm"', 'pitch = "36 mm"'),
+        ('marker = "23 mm"', 'marker = "27.6 mm"'),
         ('velocity = "60 mm/s"', 'velocity = "300 mm/s"'),
         ('acceleration = "400 mm/s2"', 'acceleration = "3000 mm/s2"'),
         ('velocity = "30 deg/s"', 'velocity = "60 deg/s"'),
         ('acceleration = "200 deg/s2"', 'acceleration = "600 deg/s2"'),
         ('settle = "500 ms"', 'settle = "200 ms"'),
-        ("positions = 6", "positions = 5"),
-        ("positions = 11", "positions = 9"),
+        ("positions = 6", "positions = 4"),
+        ("positions = 11", "positions = 7"),
     ),
     "cia402-pan-tilt": (
         PATIENT,
@@ -63,12 +71,12 @@ CHANGES = {
         ('acceleration = "120 deg/s2"', 'acceleration = "400 deg/s2"'),
         ('settle = "1 s"', 'settle = "300 ms"'),
         ("damping = 0.12", "damping = 0.4"),
-        ("positions = 11", "positions = 7"),
+        ("positions = 11", "positions = 6"),
         ('["-13 deg", "-7 deg", "-0.6 deg", "5.5 deg", "11.5 deg"]', '["-7 deg", "5.5 deg"]'),
         ('["-7.7 deg", "-4.1 deg", "-0.5 deg", "3.1 deg", "6.7 deg"]', '["-4.1 deg", "3.1 deg"]'),
     ),
 }
-LATENCY: Final = ('latency = "2 s"', 'latency = "1.5 s"\ntimeout = "60 s"')
+LATENCY: Final = ('latency = "2 s"', 'latency = "1 s"\ntimeout = "60 s"')
 """Of the emulated cameras: each view waits for all of it, and pictures that come later end the run.
 
 A machine that is too busy to render any is no lost camera.

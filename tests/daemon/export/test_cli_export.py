@@ -52,8 +52,9 @@ def test_one_that_cannot_be_had_ends_it_with_a_sentence_and_leaves_nothing(
 
 
 def test_all_leaves_out_what_cannot_be_had_and_says_so(
-    calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("daemon.export.catalogue.made_apart", lambda *_: b"a report, which takes seconds")
     calibration.with_name("session.json").unlink()
     assert run(str(calibration), "--all", "-o", str(tmp_path / "out")) == 0
     assert "session.zip is left out: there is no session.json" in capsys.readouterr().err

@@ -59,6 +59,18 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     )
 
 
+@pytest.fixture(scope="module")
+def page(subject: Subject) -> bytes:
+    """Its report for browsers."""
+    return html(report(subject))
+
+
+@pytest.fixture(scope="module")
+def paper(subject: Subject) -> bytes:
+    """Its report to print."""
+    return pdf(report(subject))
+
+
 def blocks_of(subject: Subject, kind: Any) -> list[Any]:
     return [block for block in report(subject).blocks if isinstance(block, kind)]
 
@@ -172,20 +184,19 @@ class Page(HTMLParser):
         self.words.append(data)
 
 
-def test_the_page_is_whole_and_asks_for_nothing_from_elsewhere(subject: Subject) -> None:
-    written = html(report(subject))
-    page = Page(written)
-    assert page.open == []
-    assert {tag for tag, _ in page.tags} & {"script", "link", "iframe", "object", "form", "a", "b"} == set()
-    for tag, attributes in page.tags:
+def test_the_page_is_whole_and_asks_for_nothing_from_elsewhere(subject: Subject, page: bytes) -> None:
+    read = Page(page)
+    assert read.open == []
+    assert {tag for tag, _ in read.tags} & {"script", "link", "iframe", "object", "form", "a", "b"} == set()
+    for tag, attributes in read.tags:
         assert not any(name.startswith("on") for name in attributes)
         if tag == "img":
             assert str(attributes["src"]).startswith("data:image/svg+xml;base64,")
             assert attributes["alt"]
-    assert b"http:" not in written
-    assert b"https:" not in written
-    assert b"url(" not in written
-    text = "".join(page.words)
+    assert b"http:" not in page
+    assert b"https:" not in page
+    assert b"url(" not in page
+    text = "".join(read.words)
     assert str(subject.calibration.quality.verdict) in text
     assert LAST_WORDS in text
 
@@ -213,12 +224,11 @@ def text_of(written: bytes) -> str:
     return re.sub(r"\s+", " ", " ".join(sheet.text for sheet in sheets_of(written)))
 
 
-def test_the_pdf_has_pages_with_the_same_words_and_its_title(subject: Subject) -> None:
-    written = pdf(report(subject))
-    with closing(pypdfium2.PdfDocument(written)) as document:
+def test_the_pdf_has_pages_with_the_same_words_and_its_title(subject: Subject, paper: bytes) -> None:
+    with closing(pypdfium2.PdfDocument(paper)) as document:
         assert document.get_metadata_dict()["Title"] == "Calibration: A <table> & $more$"
         assert len(document) >= 3
-    text = text_of(written)
+    text = text_of(paper)
     assert str(subject.calibration.quality.verdict) in text
     assert LAST_WORDS in text
     for heading in blocks_of(subject, Heading):
@@ -226,12 +236,12 @@ def test_the_pdf_has_pages_with_the_same_words_and_its_title(subject: Subject) -
 
 
 @pytest.mark.parametrize("name", ["two axes", "an arm with much to say"])
-def test_no_words_of_a_page_lie_on_others_or_off_it(name: str, subject: Subject) -> None:
-    shown = subject
+def test_no_words_of_a_page_lie_on_others_or_off_it(name: str, paper: bytes) -> None:
+    shown = paper
     if name != "two axes":
         arm = calibration_of("six-axis-arm")
-        shown = subject_of(arm, rig="an arm " * 30, note="long " * 90 + 200 * "o")
-    for sheet in sheets_of(pdf(report(shown))):
+        shown = pdf(report(subject_of(arm, rig="an arm " * 30, note="long " * 90 + 200 * "o")))
+    for sheet in sheets_of(shown):
         width, height = sheet.size
         assert sheet.lines
         for left, bottom, right, top in sheet.lines:
@@ -244,9 +254,9 @@ def test_no_words_of_a_page_lie_on_others_or_off_it(name: str, subject: Subject)
 
 
 def test_one_that_is_made_apart_is_the_same_and_an_error_there_is_one_here(
-    subject: Subject, caplog: pytest.LogCaptureFixture
+    subject: Subject, page: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert made_apart("html", subject) == html(report(subject))
+    assert made_apart("html", subject) == page
     with pytest.raises(ExportError, match="an error in the program"):
         made_apart("html", replace(subject, verification="[]"))
     assert "ValidationError" in caplog.text
@@ -293,7 +303,7 @@ def is_alive(pid: int) -> bool:
         return False
 
 
-def test_the_same_calibration_makes_the_same_files(subject: Subject) -> None:
+def test_the_same_calibration_makes_the_same_files(subject: Subject, page: bytes, paper: bytes) -> None:
     again = replace(subject, calibration=Calibration.model_validate_json(subject.document))
-    assert html(report(again)) == html(report(subject))
-    assert pdf(report(again)) == pdf(report(subject))
+    assert html(report(again)) == page
+    assert pdf(report(again)) == paper
