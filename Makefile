@@ -16,7 +16,7 @@ demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, i
 	$(BIN)/activecam demo
 
 test: $(VENV)/.installed-dev ## All tests but the slow suites
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 test-kernel: $(VENV)/.installed-dev ## The drivers against real kernel devices, in a virtual machine that VMRUN (a command) runs its arguments in
 	@test -n "$(VMRUN)" || { echo "make test-kernel: say what runs a command in a virtual machine, VMRUN=..."; exit 2; }

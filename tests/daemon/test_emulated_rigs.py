@@ -30,8 +30,8 @@ POSES: Final = 20
 POSITION, ROTATION = 3e-4, 5e-4
 """Metres and radians that a pose may be off."""
 
-# Of what a rig takes its time for there is less. Pictures, which are rendered while axes move, are fewer and smaller, but
-# of a larger board; axes are faster and stand sooner; some views are left out.
+# Of what a rig takes its time for there is less. Pictures, which are rendered while axes move, are fewer and smaller,
+# but of a larger board; axes are faster and stand sooner; some views are left out.
 PATIENT = ("[procedure]", '[procedure]\nframe_timeout = "60 s"')
 FEWER_PICTURES = ('frame_rate = "10 Hz"', 'frame_rate = "5 Hz"')
 CHANGES = {
