@@ -4,14 +4,16 @@ import io
 import json
 import logging
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import httpx
 import pytest
 
 from daemon.operation.log_fields import log_fields
 from daemon.operation.log_format import OURS, JsonLines, LogFormat, LogLevel, TextLines, log_to_stderr
+from daemon.rig import Devices
 from daemon.service import Service
+from drivers.simulated import SimulatedController
 from tests.daemon.motions import home_all
 
 
@@ -115,15 +117,12 @@ async def test_all_that_a_request_does_has_its_id(
 
 
 async def test_a_motion_that_fails_names_its_axis(
-    service: Service, client: httpx.AsyncClient, lines: io.StringIO
+    service: Service, client: httpx.AsyncClient, devices: Devices, lines: io.StringIO
 ) -> None:
     await home_all(service.rig)
-    lease = {"X-Lease": (await client.post("/lease", json={"owner": "anna"})).json()["token"]}
-    await client.post("/axes/slide/move", json={"target": 90}, headers=lease | {"X-Request-ID": "far"})
-    await client.post("/axes/slide/stop")
-    held = service.leases.current
-    assert held is not None
-    await service.motions.stopped(held)
+    cast(SimulatedController, devices.controllers["stage"]).inject("stall", "slide")
+    headers = {"X-Lease": service.leases.acquire("anna", "", 60.0).token, "X-Request-ID": "far"}
+    await client.post("/axes/slide/move?wait=true", json={"target": 90}, headers=headers)
     [failed] = [entry for entry in records(lines) if entry["logger"] == "daemon.client_motion"]
     assert (failed["axis"], failed["request"]) == ("slide", "far")
 
