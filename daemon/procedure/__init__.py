@@ -7,7 +7,8 @@ In the order in which a run goes:
     run           its states, from its start to its last word;  gate  where it waits while paused
     plan          what it would do, and how long that takes;  checklist  is all as it should be?
     assignment    what it has to do: measure and solve, or solve what there is
-    survey        homing, sweeps and free views;  observation  one view;  remarks  what is told of views
+    survey        homing, sweeps and free views;  observation  one view;  unseen  those that show no target
+    remarks       what is told of views
     measured      what is on disk of it, read back
     conclusion    solving and verification;  worker  a thread for them that can be abandoned
     events        what it tells;  event_log  told in order, kept, followed;  event_file  their lines on disk

@@ -2,27 +2,23 @@
 
 import asyncio
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, cast
 
-from calib.errors import CalibError, DetectionError
+from calib.errors import DetectionError
 from calib.observations import Observation as ViewObservation
-from calib.observations import observe, observed_in
-from calib.second_look import partly_seen
-from calib.session import Session
+from calib.observations import observed_in
 from calib.session_writer import Picture, SessionWriter
 from daemon.errors import TargetUnseenError
 from daemon.procedure.assignment import Checkpoint, Note
 from daemon.procedure.event_log import EventLog
 from daemon.procedure.events import Homing, JointStarted, Moving, Planned, Use, ViewTaken, Warned
-from daemon.procedure.observation import Observation, Observer, Taken, find, find_where_predicted
+from daemon.procedure.observation import Observation, Observer, find
 from daemon.procedure.remarks import Remarks, Spot
+from daemon.procedure.unseen import Unseen
 from daemon.profile import FreeView, Sweep
 from daemon.rig import Rig
 from drivers.cancellation import finish
 
-MOST_KEPT = 8
-"""Positions of a sweep whose frames are kept to be looked at again at its end."""
 FEWEST_VIEWS = 2
 """Positions of a fit sweep at which the target must be seen: one shows no motion of the joint."""
 
@@ -48,10 +44,8 @@ class Survey:
         self._positions = sum(1 for _ in self._procedure.planned_views())
         self._position = 0
         self._resumed = bool(writer.session.views or writer.session.set_aside)
-        self._forgotten = bool(writer.session.views)  # what an earlier part of the run saw
         self._remarks = Remarks(log, self._positions)
-        self._seen: list[ViewObservation] = []
-        self._unseen: list[_Unseen] = []
+        self._unseen = Unseen(writer, self._remarks)
 
     async def take(self) -> None:
         """Home what is not homed, then take every view that is missing.
@@ -90,7 +84,7 @@ class Survey:
         seen = 0
         for reading in sweep.readings:
             seen += await self._view({sweep.joint: reading}, sweep.joint, sweep.use)
-        seen += await self._look_again()
+        seen += await self._unseen.look_again(self._store)
         if sweep.use == "fit" and seen < FEWEST_VIEWS:
             raise TargetUnseenError(
                 f"the target was found at {seen} of {len(sweep.readings)} positions of '{sweep.joint}', "
@@ -103,7 +97,7 @@ class Survey:
         self._remarks.begin_sweep()
         for view in views:
             await self._view(view.readings, None, view.use)
-        await self._look_again()
+        await self._unseen.look_again(self._store)
 
     async def _view(self, targets: Mapping[str, float], joint: str | None, use: Use) -> bool:
         """Take one view; return whether the target was found."""
@@ -118,47 +112,15 @@ class Survey:
                 observation = await asyncio.to_thread(find, taken, self._rig.profile.target)
             except DetectionError as error:
                 if not first:  # a picture can be spoilt by what passes by; a second one tells
-                    self._unseen.append(_Unseen(spot, taken, str(error)))
+                    self._unseen.keep(spot, taken, str(error))
             else:
-                picture = await self._store(observation, spot)
-                self._note(picture, self._seen[-1])
+                self._note(*await self._store(observation, spot))
                 self._remarks.warn(observation, spot)
                 return True
-        if len(self._unseen) > MOST_KEPT:
-            self._leave_out(self._unseen.pop(0))
         return False
 
-    async def _look_again(self) -> int:
-        """Look where the other views predict it for the target that was not found; return in how many views it is.
-
-        A grid without numbers that is partly out of the picture is not found otherwise.
-        """
-        if self._unseen and self._forgotten:
-            self._seen = await asyncio.to_thread(_observed_on_disk, self._writer.session)
-            self._forgotten = False
-        count, found = 0, True
-        while found:
-            found = False
-            for unseen in list(self._unseen):
-                session, seen = self._writer.session, list(self._seen)
-                try:
-                    observation = await asyncio.to_thread(_where_predicted, unseen.taken, session, seen)
-                except CalibError:
-                    continue
-                self._unseen.remove(unseen)
-                await self._store(observation, unseen.spot)
-                self._remarks.tell(unseen.spot, partly_seen(observation.seen.detection, session.target))
-                self._remarks.warn(observation, unseen.spot)
-                count, found = count + 1, True
-        while self._unseen:
-            self._leave_out(self._unseen.pop(0))
-        return count
-
-    def _leave_out(self, unseen: "_Unseen") -> None:
-        self._remarks.leave_out(unseen.spot, unseen.problem)
-
-    async def _store(self, observation: Observation, spot: Spot) -> str:
-        """Put a view on disk and tell of it; return its picture's name."""
+    async def _store(self, observation: Observation, spot: Spot) -> tuple[str, ViewObservation]:
+        """Put a view on disk and tell of it; return its picture's name, and what is seen in it."""
         taken, detection = observation.taken, observation.seen.detection
         fields: dict[str, Any] = {
             "joint": spot.joint,
@@ -171,7 +133,8 @@ class Survey:
         view = await finish(asyncio.to_thread(self._writer.add_pictures, pictures, **fields))
         assert view.image is not None
         place = len(self._writer.session.views) - 1
-        self._seen.append(observed_in(detection, place, self._writer.session.camera_index(view)))
+        seen = observed_in(detection, place, self._writer.session.camera_index(view))
+        self._unseen.know(seen)
         self._log.add(
             ViewTaken(
                 position=spot.position,
@@ -185,31 +148,4 @@ class Survey:
                 image=view.image,
             )
         )
-        return view.image
-
-
-@dataclass(frozen=True, slots=True)
-class _Unseen:
-    """Frames in which the target was not found, and why."""
-
-    spot: Spot
-    taken: Taken
-    problem: str
-
-
-def _observed_on_disk(session: Session) -> list[ViewObservation]:
-    """Return what is seen in the pictures of all views, those of an earlier part of the run among them."""
-    try:
-        return observe(session).observations
-    except CalibError:
-        return []
-
-
-def _where_predicted(taken: Taken, session: Session, seen: list[ViewObservation]) -> Observation:
-    """Find the target where the views `seen` of `session` predict it; raises CalibError."""
-    from calib.prediction import (
-        predicted_by_views,
-    )  # it brings scipy, which a daemon that serves poses does without
-
-    predicted = predicted_by_views(session, seen, taken.readings)
-    return find_where_predicted(taken, session.target, predicted)
+        return view.image, seen

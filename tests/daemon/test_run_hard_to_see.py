@@ -87,7 +87,7 @@ class TestATargetHardToSee:
         self, tmp_path: Path, blind: Callable[[set[int]], None], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         blind({2, 3, 4, 5})
-        monkeypatch.setattr("daemon.procedure.survey.MOST_KEPT", 1)
+        monkeypatch.setattr("daemon.procedure.unseen.MOST_KEPT", 1)
         profile = small_rig(tmp_path, positions=6)
         async with running_service(profile, tmp_path / "data") as service:
             _, events = await finish(service, await service.runs.start())

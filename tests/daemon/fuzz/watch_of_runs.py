@@ -152,7 +152,7 @@ class RunWatch:
 
     def _told(self, run: str, event: RunEvent) -> None:
         """Look at what a run is about to tell."""
-        if event.type in MOVES and run in self._paused:
+        if event.type in {*MOVES, "solving"} and run in self._paused:
             self.broken.append(f"{run}: it goes on with {event.type} although it was paused")
         if event.type == "plan":
             taken = any(earlier.type == "view" for earlier in read_events(self._sessions / run))
