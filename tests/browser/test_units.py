@@ -1,0 +1,102 @@
+"""No number is without its unit: in tables, figures and legends, of a rig in mm and degrees and of one in counts."""
+
+import re
+from collections.abc import Callable, Iterator
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.daemons import Daemon
+from tests.browser.test_judging import calibrate, quick_rig
+
+Open = Callable[..., Page]
+
+PURE = {"Positions", "Points", "Views of the fit", "Direction", "In stds", "In standard deviations"}
+"""Columns of numbers that have no unit."""
+PURE_PARAMETERS = re.compile(r"(.*: )?(axis, [xyz]|[kp]\d)")
+IN_HEADING = re.compile(r"\((mm|°|mrad|px)\)|%")
+BESIDE = re.compile(
+    r"\u00a0(mm|px|mrad|counts|min|s|B|kB|MB)\b|°| %| (s|points|times|views|GB)\b| (to|–) [−\d.]+(\u00a0|°)"
+)
+NUMBERS = """selectors => [...document.querySelectorAll(selectors)].map(each => each.textContent)"""
+CELLS = """() => [...document.querySelectorAll("main table")].flatMap(table => {
+  const heads = [...table.tHead.rows[0].cells].map(cell => cell.textContent);
+  return [...table.tBodies[0].rows].flatMap(({ cells }) => [...cells].map((cell, i) =>
+    [heads[i], cell.textContent.trim(), cells[0].textContent, cells[heads.indexOf("Unit")]?.textContent ?? ""]));
+})"""
+SHOWN = (
+    ".position, .scaled, .travel span, .ends span, .chart figcaption, .coverage-bar .number, .scene p.hint,"
+    " .residual, .wall .where, .judge-figures dd, .judge figcaption, .exports .size"
+)
+
+
+@pytest.fixture(scope="module", params=["small", "counts"])
+def daemon(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A rig that is calibrated, once in mm and degrees and once in its motors' counts."""
+    folder = tmp_path_factory.mktemp("rig")
+    daemon = quick_rig(folder) if request.param == "small" else Daemon(folder, "pan-tilt")
+    daemon.start()
+    with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=120) as api:
+        calibrate(api)
+    yield daemon
+    daemon.stop()
+
+
+def bare(page: Page) -> list[str]:
+    """Return what is shown as a number and nothing more, and where."""
+    found = []
+    for head, text, name, unit in page.evaluate(CELLS):
+        is_number = re.fullmatch(r"[±−\d][−\d.,\s]*", text)
+        is_pure = head in PURE or PURE_PARAMETERS.fullmatch(name)
+        if is_number and not (is_pure or unit or IN_HEADING.search(head)):
+            found.append(f"{name}, {head}: {text}")
+    for text in page.evaluate(NUMBERS, SHOWN):
+        without_names = re.sub(r"View \d+|0 fits", "", text)
+        numbers = re.finditer(r"(?<![\w.,])[\d.,]*\d", without_names)
+        found += [f"{each[0]} in: {text}" for each in numbers if not BESIDE.match(without_names, each.end())]
+    return found
+
+
+def test_every_number_has_its_unit_in_each_section(daemon: Daemon, open_page: Open) -> None:
+    page = open_page(daemon.address)
+    page.get_by_label("Coverage").check()
+    expect(page.get_by_role("meter").first).to_be_visible()
+    page.get_by_text("As a table").click()
+    expect(page.get_by_role("row", name="base")).to_be_visible()
+    assert bare(page) == []
+    for path, there in (
+        ("#/calibrate", page.locator(".residual").last.filter(has_text="px")),
+        ("#/calibrate/new", page.get_by_role("row", name="to calibrate from").first),
+        ("#/judge", page.get_by_role("img", name=re.compile("Residuals by place"))),
+        ("#/takeaway", page.get_by_role("link", name="rig.urdf")),
+    ):
+        page.goto(f"{daemon.address}{path}")
+        expect(there).to_be_visible()
+        assert page.evaluate(NUMBERS, SHOWN) != []
+        assert bare(page) == [], path
+
+
+def test_a_comparison_has_its_units_too(daemon: Daemon, open_page: Open) -> None:
+    with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=120) as api:
+        [entry, *_] = api.get("/calibrations").json()
+    page = open_page(f"{daemon.address}#/judge/{entry['id']}/{entry['id']}")
+    page.get_by_text("What differs, in numbers").click()
+    expect(page.get_by_role("columnheader", name="Rotation (mrad)")).to_be_visible()
+    assert bare(page) == []
+
+
+def test_counts_stand_beside_what_they_are_worth(daemon: Daemon, open_page: Open) -> None:
+    page = open_page(daemon.address)
+    with httpx.Client(base_url=f"{daemon.address}api/v1") as api:
+        rig = api.get("/rig").json()
+        [entry] = api.get("/calibrations").json()
+        joints = api.get(f"/calibrations/{entry['id']}").json()["calibration"]["joints"]
+    for axis, joint in zip(rig["axes"], joints, strict=True):
+        scaled = page.get_by_role("article", name=f"Axis {axis['name']}").locator(".scaled")
+        if axis["unit"] != "counts":
+            expect(scaled).to_be_hidden()  # what is shown is in mm and degrees already
+            continue
+        expect(scaled).to_be_visible()
+        shown = float((scaled.text_content() or "").strip("≈ °").replace("−", "-"))
+        assert shown == pytest.approx(axis["position"] * joint["scale"] * 57.29578, abs=0.03)
