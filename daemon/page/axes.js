@@ -3,7 +3,7 @@
 import { fill, h, setText } from "./elements.js";
 import { Jogging } from "./jogging.js";
 import { Scales } from "./scales.js";
-import { measureOf, number, quantity, reading, sign } from "./units.js";
+import { measureOf, number, quantity, reading, sentenceOf, sign } from "./units.js";
 
 /** Jog steps in mm or degrees, or in whatever an axis counts, as shares of a power of ten. */
 const STEPS = { mm: [0.1, 1, 10, 100], deg: [0.1, 1, 5, 15] };
@@ -63,6 +63,7 @@ class Card {
   #scaled = h("span", { class: "scaled" });
   #condition = h("span", { class: "condition" });
   #marker = h("i", {});
+  #home = h("button", { type: "button", class: "home", onclick: () => this.#goHome() }, "Home");
   #error = h("p", { class: "problem", role: "status" });
 
   constructor(axis, page, jogging, scales, signal) {
@@ -72,6 +73,7 @@ class Card {
     this.#measure = measureOf(axis);
     const { name } = axis;
     const step = this.#steps();
+    this.#home.append(h("span", { class: "visually-hidden" }, ` ${name}`));
     this.jog = jogging.of(() => this.#axis, () => Number(step.value) / this.#measure.factor);
     const arrow = (label, text, way) => {
       const button = h("button", { type: "button", class: "jog", "aria-label": `Jog ${name} ${label}; hold to go on` }, text);
@@ -88,7 +90,7 @@ class Card {
         { class: "axis-controls" },
         h("div", { class: "group" }, arrow("backwards", "−", -1), step, arrow("forwards", "+", 1)),
         this.#goTo(),
-        h("button", { type: "button", class: "home", onclick: () => this.#home() }, "Home", h("span", { class: "visually-hidden" }, ` ${name}`)),
+        this.#home,
       ),
       this.#error,
     );
@@ -110,11 +112,13 @@ class Card {
     const condition = axis.lost ? "lost" : axis.fault ? "in fault" : axis.moving ? "moving" : axis.homed ? "homed" : "not homed";
     setText(this.#condition, condition);
     this.#condition.dataset.kind = condition;
+    this.#home.classList.toggle("primary", condition === "not homed"); // what comes next
     this.#marker.hidden = axis.position === null || !axis.homed;
     const [low, high] = axis.limits;
     const share = Math.min(1, Math.max(0, (axis.position - low) / (high - low)));
     this.#marker.style.left = `${(100 * share).toFixed(2)}%`;
-    setText(this.#error, axis.lost ?? axis.fault ?? axis.last_error ?? "");
+    const error = axis.lost ?? axis.fault ?? axis.last_error;
+    setText(this.#error, error === null ? "" : sentenceOf(error));
   }
 
   /** Return what a reading in counts is in mm or degrees, by the active calibration. */
@@ -169,7 +173,7 @@ class Card {
     return form;
   }
 
-  #home() {
+  #goHome() {
     return this.#do("home", { axis: this.#axis.name });
   }
 

@@ -5,6 +5,9 @@ import { sentenceOf } from "./units.js";
 
 const MARKS = { true: ["✓", "ok"], false: ["✗", "not ok"], null: ["?", "not known"] };
 
+/** Whose the axes are where they are this page's, as a check. */
+const OWN = { ok: true, message: "you have control" };
+
 /** Fill `element`; returns what looks again. */
 export function mountChecklist(element, page, signal) {
   const outcome = h("p", { class: "words", role: "status" });
@@ -12,7 +15,8 @@ export function mountChecklist(element, page, signal) {
   fill(element, h("h2", { id: "checklist-title" }, "Before the start"), outcome, list);
   const items = new Map();
 
-  function show({ ready, checks }) {
+  function show({ ready, checks: found }) {
+    const checks = found.map((check) => (check.name === "free" && page.lease.held ? { ...check, ...OWN } : check));
     for (const check of checks) {
       if (!items.has(check.name)) items.set(check.name, new Item(check, page, signal));
       items.get(check.name).show(check);
@@ -57,7 +61,8 @@ class Item {
     setText(this.#mark, mark);
     setText(this.#word, `: ${word}`);
     setText(this.#message, sentenceOf(message));
-    if (this.#mend !== null) this.#mend.hidden = ok === true;
+    const isNeeded = this.#mend?.localName === "a" ? ok === false : ok !== true; // elsewhere one goes with a reason only
+    if (this.#mend !== null) this.#mend.hidden = !isNeeded;
   }
 }
 

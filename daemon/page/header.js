@@ -3,6 +3,7 @@
 import { fill, h, setText } from "./elements.js";
 
 const LOST = "The daemon does not answer. Nothing here is up to date; this page connects again by itself.";
+const DEAD = ["lost", "No connection", LOST];
 
 /** Follow the state for as long as the page is open. */
 export function mountHeader(page, banners) {
@@ -16,22 +17,27 @@ export function mountHeader(page, banners) {
   banners.append(dead, problems);
 
   page.follow((state) => {
-    document.documentElement.dataset.connection = state === null ? "lost" : "live";
-    setText(connection, state === null ? "No connection" : whatGoesOn(state));
+    known ||= state !== null;
+    if (!known) return; // the first one is on its way, or a key is asked for
     setText(problems, state?.problems.join(" ") ?? "");
     if (state !== null) {
       setText(name, state.rig.name);
       document.title = `${state.rig.name} – activecam`;
-      setText(dead, "");
-    } else if (known) {
-      setText(dead, LOST);
+      tellConnection("live", whatGoesOn(state), "");
+    } else {
+      tellConnection(...DEAD);
     }
-    known ||= state !== null;
     const now = JSON.stringify([state?.you, state?.rig.lease?.owner, state?.rig.lease?.expires_at === null]);
     if (now !== shown) tellLease(page, lease, state);
     shown = now;
   });
-  page.live.addEventListener("refused", () => setText(dead, LOST));
+  page.live.addEventListener("refused", () => tellConnection(...DEAD));
+
+  function tellConnection(kind, words, banner) {
+    document.documentElement.dataset.connection = kind;
+    setText(connection, words);
+    setText(dead, banner);
+  }
 }
 
 function whatGoesOn(state) {

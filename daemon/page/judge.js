@@ -9,7 +9,7 @@ import { mountComparison } from "./comparison.js";
 import { fill, h, table } from "./elements.js";
 import { paperTables, parameterTables } from "./paper_tables.js";
 import { drawByDirection, drawByPlace, magnification, pointsOf, summaryOf } from "./residual_plots.js";
-import { moment, quantity } from "./units.js";
+import { moment, quantity, sentenceOf } from "./units.js";
 import { activation, advice, digitsOf, figures, groundsOf, judgementOf, movedBy, takeAway, verdict } from "./verdict.js";
 import { mountViews } from "./worst_views.js";
 
@@ -34,7 +34,8 @@ async function show(element, page, signal, [chosen, other]) {
   const entries = await get("calibrations");
   if (!entries.length) {
     const words = "Nothing is calibrated yet: the first calibration run makes a calibration, which is judged here.";
-    fill(element, panel("Verdict", "verdict", h("p", { class: "empty" }, words)));
+    const next = h("p", {}, h("a", { class: "button", href: "#/calibrate/new" }, "Prepare a run"));
+    fill(element, panel("Verdict", "verdict", h("p", { class: "empty" }, words), next));
     return;
   }
   const id = chosen ?? (entries.find((each) => each.active) ?? entries[0]).id;
@@ -138,7 +139,7 @@ async function solveAgain({ entry, leaveOut, page, signal, tell }) {
   const ended = new Promise((resolve, reject) => {
     const follow = async ({ detail: event }) => {
       if (event.run_id !== run) return;
-      if (event.type === "solving") tell(`${event.message} …`);
+      if (event.type === "solving") tell(`${sentenceOf(event.message).slice(0, -1)} …`);
       if (event.type !== "finished") return;
       // After a reconnection earlier ends are told again: the run itself says whether it is over.
       const record = await page.api.get(`runs/${run}`, { signal }).catch(reject);

@@ -1,6 +1,6 @@
 /** Showing a key, where the daemon asks for one: a cookie that no script can read stands for it afterwards. */
 
-import { fill, h } from "./elements.js";
+import { fill, h, setText } from "./elements.js";
 
 /** Return when the daemon knows who asks; `element` has the form for that meanwhile. */
 export async function signedIn(page, element) {
@@ -37,6 +37,7 @@ function askForKey(page, element, done) {
       input.focus();
     }
   });
+  setText(document.getElementById("connection"), "Not signed in");
   fill(element, form);
   input.focus();
 }

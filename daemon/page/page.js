@@ -29,10 +29,15 @@ export class Page {
 
   /** The name under which this page moves and starts runs. */
   get owner() {
-    return this.you?.key ?? (localStorage.getItem(NAME) || "somebody at the page");
+    return this.you?.key ?? (this.name || "somebody at the page");
   }
 
-  set owner(name) {
+  /** What the user is called where no key says it, as they have told; empty where they have not. */
+  get name() {
+    return localStorage.getItem(NAME) ?? "";
+  }
+
+  set name(name) {
     localStorage.setItem(NAME, name.trim());
   }
 

@@ -3,11 +3,14 @@
 import { socketAddress } from "./api.js";
 import { Coverage } from "./coverage.js";
 import { fill, h, setText } from "./elements.js";
+import { sentenceOf } from "./units.js";
 
 /** Milliseconds for which something must be so before it is said: not every flicker is news. */
 const SETTLED = 1000;
 /** Milliseconds over which the frame rate is counted. */
 const COUNTED = 3000;
+/** Kind of what is said while there is no picture. */
+const LACKING = "no picture";
 
 /** Fill `element` with the camera's picture, which is live while it is looked at. */
 export function mountPicture(element, page, signal) {
@@ -42,7 +45,7 @@ export function mountPicture(element, page, signal) {
   const feed = new Feed((head, picture) => {
     if (head.code) {
       show(null);
-      health.say(head.code, head.detail, []);
+      health.lack(sentenceOf(head.detail));
       return undefined;
     }
     const now = performance.now();
@@ -76,7 +79,7 @@ export function mountPicture(element, page, signal) {
       arrivals.length = 0;
       setText(rate, "");
       show(null);
-      health.say("gone", "There is no picture without a connection.", []);
+      health.lack("There is no picture without a connection.");
     } else {
       feed.open();
     }
@@ -208,12 +211,17 @@ class Health {
     const kind = [found ? seen : "", ...faults.map((fault) => fault.kind)].join(" ");
     const now = performance.now();
     if (kind !== this.#coming) [this.#coming, this.#since] = [kind, now];
-    const isNews = kind !== this.#said && (this.#said === null || now - this.#since > SETTLED);
+    const isNews = kind !== this.#said && ([null, LACKING].includes(this.#said) || now - this.#since > SETTLED);
     if (!isNews && (kind !== this.#said || now - this.#refreshed < SETTLED)) return;
     this.#refreshed = now;
     const part = found && of > ids.length ? [`${ids.length} of its ${of} points are found.`] : [];
     const details = [...part, ...faults.map((fault) => fault.message)];
     this.say(kind, isNews ? text : this.#words.textContent, details, found && !faults.length);
+  }
+
+  /** Say why there is no picture. */
+  lack(text) {
+    this.say(LACKING, text, []);
   }
 
   say(kind, text, details, isGood = false) {

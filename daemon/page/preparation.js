@@ -46,12 +46,20 @@ export function mountPreparation(element, page, signal) {
 
 /** Fill `element` with the start; returns what is told how long the run will take. */
 function mountStart(element, page, signal, plan) {
+  const name = h("input", { id: "name", maxlength: "100", autocomplete: "name", value: page.name });
+  name.addEventListener("change", () => (page.name = name.value));
   const note = h("input", { id: "note", maxlength: "1000", placeholder: "which target, what has changed" });
   const about = h("p", {});
   const form = h(
     "form",
     {},
-    h("fieldset", { class: "bare" }, h("label", { for: "note" }, "Note for the lab book"), h("div", { class: "start-line" }, note, h("button", { class: "primary" }, "Start the calibration"))),
+    h(
+      "fieldset",
+      { class: "bare start-line" },
+      page.you.key === null && h("div", { class: "name" }, h("label", { for: "name" }, "Your name"), name),
+      h("div", { class: "note" }, h("label", { for: "note" }, "Note for the lab book"), note),
+      h("button", { class: "primary" }, "Start the calibration"),
+    ),
   );
   fill(element, h("h2", { id: "start-title" }, "Start"), about, form);
   page.guard(form.querySelector("fieldset"), signal);

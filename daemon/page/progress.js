@@ -35,7 +35,7 @@ export class Progress {
   /** Return what is at a position: "taken", "now", "unseen" or "to come". */
   at(position) {
     if (this.taken.has(position)) return "taken";
-    if (position === this.position && !this.over && this.phase === "measuring") return "now";
+    if (position === this.position && this.phase === "measuring") return this.over ? "to come" : "now";
     return position <= this.position ? "unseen" : "to come";
   }
 

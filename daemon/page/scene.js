@@ -155,7 +155,7 @@ export function mountScene(element, page, signal) {
 /** Return the scene in numbers, in the world's frame. */
 function tableOf({ base, joints, cameras, target }) {
   const place = (point) => point.map((each) => number(1000 * each, 1));
-  const way = (vector) => vector.map((each) => number(each, 3)).join(", ");
+  const way = (vector) => vector.map((each) => number(each, 2)).join(", ");
   const column = (pose, i) => pose.slice(0, 3).map((row) => row[i]);
   const std = ({ uncertainty }) => (uncertainty === null ? "–" : `± ${quantity(1000 * Math.max(...uncertainty.radii), "mm", 3)}`);
   const rows = [

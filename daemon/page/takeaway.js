@@ -9,7 +9,8 @@ export async function mount(element, page, { signal, path: [chosen] }) {
   const panel = h("section", { class: "panel", "aria-labelledby": "takeaway" }, h("h2", { id: "takeaway" }, "Take away"));
   fill(element, panel);
   if (!calibrations.length) {
-    panel.append(h("p", { class: "empty" }, "Nothing is calibrated yet: the first calibration run makes what can be taken away."));
+    const words = "Nothing is calibrated yet: the first calibration run makes what can be taken away.";
+    panel.append(h("p", { class: "empty" }, words), h("p", {}, h("a", { class: "button", href: "#/calibrate/new" }, "Prepare a run")));
     return;
   }
   const { id } = calibrations.find((each) => each.id === chosen) ?? calibrations.find((each) => each.active) ?? calibrations[0];

@@ -25,6 +25,7 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
   const again = h("button", { type: "button", class: "primary" });
   const progress = h("p", { class: "progress", role: "status" });
   const fieldset = h("fieldset", { class: "bare solving" }, again, progress);
+  const pointless = h("p", { class: "hint", hidden: true }, "Held-out views are what is predicted: without these alone the verdict changes, and the calibration does not.");
   const viewer = h("figure", { class: "viewer", "aria-live": "polite" });
   let residuals = null;
   let shown = null;
@@ -32,8 +33,14 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
 
   function list() {
     fill(body, ...(whole ? sorted : sorted.slice(0, FEW)).map(row));
+    mark();
     all.hidden = sorted.length <= FEW;
     all.textContent = whole ? "Show the worst alone" : `Show all ${sorted.length} views`;
+  }
+
+  /** Mark the row of the view that is looked at; the focus stays where it is. */
+  function mark() {
+    for (const each of body.rows) each.toggleAttribute("data-shown", each.dataset.view === String(shown?.number));
   }
 
   function row(view) {
@@ -50,7 +57,7 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
     const remark = view.left_out ? "left out" : view.set_aside ? "set aside" : view.use === "verify" ? "held out" : "";
     return h(
       "tr",
-      { "aria-selected": shown?.number === view.number ? "true" : null },
+      { "data-view": view.number },
       h("td", {}, drop),
       h("th", { scope: "row" }, look),
       h("td", {}, movedBy(view.joint), remark ? [" ", h("span", { class: "remark" }, remark)] : null),
@@ -62,13 +69,15 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
   function tellWhat() {
     const same = dropped.size === before.size && [...dropped].every((each) => before.has(each));
     again.disabled = same;
+    const changed = views.filter(({ number }) => dropped.has(number) !== before.has(number));
+    pointless.hidden = same || changed.some(({ use }) => use !== "verify");
     const count = `${dropped.size} view${dropped.size === 1 ? "" : "s"}`;
     again.textContent = same ? "Solve again without the ticked views" : dropped.size ? `Solve again without ${count}` : "Solve again with all views";
   }
 
   async function show(view) {
     shown = view;
-    list();
+    mark();
     const canvas = h("canvas", { role: "img", "aria-label": `Picture of view ${view.number}, on its way` });
     const words = h("figcaption", {});
     fill(viewer, canvas, words);
@@ -129,6 +138,7 @@ export function mountViews(element, { run, views, axes, page, signal, solve }) {
           h("table", {}, h("caption", {}, caption), h("thead", {}, h("tr", {}, heads)), body),
         ),
         all,
+        pointless,
         fieldset,
       ),
       viewer,

@@ -77,13 +77,15 @@ def test_a_calibration_from_the_checklist_to_the_verdict(
     page.get_by_role("button", name="Home all").click()
     expect(page.get_by_text("All axes know where they are")).to_be_visible()
     expect(page.get_by_text("nothing stands against a run")).to_be_visible()
+    expect(page.get_by_text("You have control.")).to_be_visible()
+    page.get_by_label("Your name").fill("Anna")
     page.get_by_label("Note").fill("from the page")
     page.get_by_role("button", name="Start the calibration").click()
 
     expect(page.locator(".wall li").first).to_be_visible()
     page.get_by_role("button", name="Pause").click()
     expect(page.get_by_text("Paused: all axes stand")).to_be_visible()
-    expect(page.locator("#advance-title + p")).to_contain_text("from the page")
+    expect(page.locator("#advance-title + p")).to_contain_text("by Anna: “from the page”")
     taken = page.locator(".wall li").count()
     assert 0 < taken < VIEWS
     expect(page.locator(".left")).to_contain_text("left")
@@ -110,6 +112,27 @@ def test_a_calibration_from_the_checklist_to_the_verdict(
     link = page.get_by_role("link", name="Judge this calibration")
     expect(link).to_have_attribute("href", f"#/judge/{calibration}")
     assert violations(page, axe) == []
+
+
+def test_a_position_that_a_run_was_on_its_way_to_is_not_one_without_the_target(
+    daemon: Daemon, open_page: Open
+) -> None:
+    page = open_page(daemon.address)
+    told = page.evaluate("""async () => {
+      const { Progress } = await import(new URL("page/progress.js", document.baseURI));
+      const progress = new Progress([
+        { type: "plan", views: 4, done: 0 },
+        { type: "joint", joint: "pan" },
+        { type: "moving", position: 1, of: 4, time: "2026-03-14T09:27:01Z" },
+        { type: "view", position: 1, view: 0 },
+        { type: "moving", position: 2, of: 4, time: "2026-03-14T09:27:02Z" },
+        { type: "moving", position: 3, of: 4, time: "2026-03-14T09:27:03Z" },
+      ]);
+      const under_way = [1, 2, 3, 4].map((position) => progress.at(position));
+      progress.tell({ type: "finished", state: "cancelled" });
+      return [under_way, [1, 2, 3, 4].map((position) => progress.at(position))];
+    }""")
+    assert told == [["taken", "unseen", "now", "to come"], ["taken", "unseen", "to come", "to come"]]
 
 
 def test_a_view_is_enlarged_and_left_with_the_keyboard(daemon: Daemon, open_page: Open) -> None:

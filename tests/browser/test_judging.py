@@ -127,12 +127,30 @@ def test_the_worst_views_come_first_and_each_can_be_looked_at(
     assert names.all_text_contents() == [f"View {view['number']}" for view in worst[:8]]
     pictured = judge.get_by_role("img", name=re.compile("Picture of view"))
     expect(pictured).to_have_attribute("aria-label", re.compile(f"view {worst[0]['number']}: 20 points"))
-    views.get_by_role("button", name=f"View {worst[3]['number']}", exact=True).click()
+    fourth = views.get_by_role("button", name=f"View {worst[3]['number']}", exact=True)
+    fourth.press("Enter")
     expect(pictured).to_have_attribute(
         "aria-label", re.compile(f"view {worst[3]['number']}: 20 points, rms 0.0")
     )
+    expect(fourth).to_be_focused()
     judge.get_by_role("button", name="Show all 10 views").click()
     expect(names).to_have_count(10)
+
+
+def test_it_is_said_that_dropping_held_out_views_alone_leaves_the_calibration_as_it_is(
+    judge: Page, api: httpx.Client, run: dict[str, Any]
+) -> None:
+    judge.get_by_role("button", name="Show all 10 views").click()
+    views = api.get(f"/runs/{run['id']}/views").json()["views"]
+    held_out, fitted = (
+        next(view["number"] for view in views if view["use"] == use) for use in ("verify", "fit")
+    )
+    hint = judge.get_by_text("without these alone")
+    expect(hint).to_be_hidden()
+    judge.get_by_label(f"Drop view {held_out}", exact=True).check()
+    expect(hint).to_be_visible()
+    judge.get_by_label(f"Drop view {fitted}", exact=True).check()
+    expect(hint).to_be_hidden()
 
 
 def test_views_are_dropped_solved_without_compared_and_the_better_one_used_with_the_keyboard_alone(

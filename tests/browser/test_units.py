@@ -86,6 +86,35 @@ def test_a_comparison_has_its_units_too(daemon: Daemon, open_page: Open) -> None
     assert bare(page) == []
 
 
+@pytest.mark.parametrize("width", [1440, 800])
+def test_nothing_reaches_beyond_the_screen(daemon: Daemon, open_page: Open, width: int) -> None:
+    page = open_page(daemon.address, viewport={"width": width, "height": 900})
+    page.get_by_role("heading", name="Rig in 3-D").scroll_into_view_if_needed()
+    page.get_by_text("As a table").click()
+    expect(page.get_by_role("row", name="base")).to_be_visible()
+    assert beyond(page) == 0
+    page.goto(f"{daemon.address}#/calibrate")
+    page.locator(".wall button").first.click()
+    picture = page.get_by_role("figure", name="Enlarged view").get_by_role("img")
+    picture.evaluate("image => image.decode()")
+    assert beyond(page) == 0
+    for path, there in (
+        ("#/calibrate/new", page.get_by_role("row", name="to calibrate from").first),
+        ("#/takeaway", page.get_by_role("link", name="rig.urdf")),
+    ):
+        page.goto(f"{daemon.address}{path}")
+        expect(there).to_be_visible()
+        assert beyond(page) == 0
+
+
+def beyond(page: Page) -> int:
+    """Return how many pixels are out of sight to the right."""
+    document: dict[str, int] = page.evaluate(
+        "(({ scrollWidth, clientWidth }) => ({ scrollWidth, clientWidth }))(document.documentElement)"
+    )
+    return document["scrollWidth"] - document["clientWidth"]
+
+
 def test_counts_stand_beside_what_they_are_worth(daemon: Daemon, open_page: Open) -> None:
     page = open_page(daemon.address)
     with httpx.Client(base_url=f"{daemon.address}api/v1") as api:
