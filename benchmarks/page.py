@@ -48,13 +48,18 @@ def run(*, quick: bool) -> dict[str, float]:
     """Print the table; return the medians."""
     with _daemon() as (address, process), chromium() as browser:
         openings = [_opened(browser, address) for _ in range(1 if quick else 10)]
-        context = browser.new_context()
-        context.add_init_script(NOTE_TIMES)
-        tabs = [_tab(context, address) for _ in range(TABS)]
-        stops = [_stop(tabs[i % TABS]) for i in range(2 if quick else 30)]
-        context.close()
         rounds, seconds = (1, 1.0) if quick else (5, 4.0)
-        costs = _costs(browser, address, process, rounds, seconds)
+        costs: list[list[float]] = [[] for _ in range(TABS)]
+        stops: list[float] = []
+        for _ in range(rounds):
+            context = browser.new_context()
+            context.add_init_script(NOTE_TIMES)
+            tabs = []
+            for shares in costs:
+                tabs.append(_tab(context, address))
+                shares.append(_cost(tabs[-1], process, seconds))
+            stops += [_stop(tabs[i % TABS]) for i in range(2 if quick else 6)]
+            context.close()
     usable, sizes = zip(*openings, strict=True)
     rows = table("The page", "", "median", "min..max", "limit")
     for label, values, limit in (
@@ -132,19 +137,12 @@ def _stop(page: Page) -> float:
     return 1e3 * since - pressed
 
 
-def _costs(browser: Browser, address: str, process: int, rounds: int, seconds: float) -> list[list[float]]:
-    """Return the daemon's processor time (% of a core) with one tab, two, and three, in each of the rounds."""
-    costs: list[list[float]] = [[] for _ in range(TABS)]
-    for _ in range(rounds):
-        context = browser.new_context()
-        for shares in costs:
-            tab = _tab(context, address)
-            tab.wait_for_timeout(500)  # in which it is not all new any more
-            before, began = _processor_time(process), time.monotonic()
-            tab.wait_for_timeout(1000 * seconds)
-            shares.append(100 * (_processor_time(process) - before) / (time.monotonic() - began))
-        context.close()
-    return costs
+def _cost(newest: Page, process: int, seconds: float) -> float:
+    """Return the daemon's processor time (% of a core) with the tabs that are open."""
+    newest.wait_for_timeout(500)  # in which it is not all new any more
+    before, began = _processor_time(process), time.monotonic()
+    newest.wait_for_timeout(1000 * seconds)
+    return 100 * (_processor_time(process) - before) / (time.monotonic() - began)
 
 
 def _processor_time(process: int) -> float:

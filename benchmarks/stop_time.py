@@ -31,7 +31,7 @@ RAMP: Final = 0.3
 
 def run(*, quick: bool) -> dict[str, float]:
     """Print the table; return the medians (ms)."""
-    stops = 3 if quick else 30
+    stops = 2 if quick else 30
     say(f"{stops} stops each of a rig's first axis; none should take longer than {LIMIT:g} ms")
     rows = table("From a stop to the braking motor (ms)", "rig", "idle", "min..max", "under load", "min..max")
     figures = {}

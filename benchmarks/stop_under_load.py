@@ -37,7 +37,7 @@ LONGEST_DELAY: Final = 3.0
 
 def run(*, quick: bool) -> dict[str, float]:
     """Print the table; return the medians and the slowest in a hundred (ms)."""
-    stops = 3 if quick else 40
+    stops = 2 if quick else 40
     with (
         TemporaryDirectory() as folder,
         _emulators(Path(folder)) as (profile, told),
