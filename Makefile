@@ -15,8 +15,9 @@ SCREENSHOTS ?= screenshots
 demo: $(VENV)/.installed ## A full calibration of the paper's simulated table, in the terminal
 	$(BIN)/activecam demo
 
+# Three workers for two processors, since many tests wait for what moves at the pace of life.
 test: $(VENV)/.installed-dev ## All tests but the slow suites
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 test-kernel: $(VENV)/.installed-dev ## The drivers against real kernel devices, in a virtual machine that VMRUN (a command) runs its arguments in
 	@test -n "$(VMRUN)" || { echo "make test-kernel: say what runs a command in a virtual machine, VMRUN=..."; exit 2; }

@@ -75,7 +75,7 @@ async def test_who_asks_for_each_pose_gets_none_that_is_older_than_the_asking(
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(socket.recv(), 0.1)
         await socket.send("next")
-        until_then = rig.snapshot.axes[0].number + 500
+        until_then = rig.snapshot.axes[0].number + 100
         await until(rig, lambda snapshot: snapshot.axes[0].number >= until_then)
         assert (await receive(socket))["dropped"] == 0  # asked for before the client stood still
         for _ in range(3):
