@@ -102,6 +102,7 @@ class Card {
       setText(this.#position, "–");
       setText(this.#condition, "not known");
       delete this.#condition.dataset.kind;
+      this.#home.classList.remove("primary");
       setText(this.#scaled, "");
       this.#marker.hidden = true;
       return;

@@ -1,6 +1,7 @@
 /** How the views of the latest run cover the picture: a layer over it, and bars beside. */
 
 import { fill, h } from "./elements.js";
+import { sentenceOf } from "./units.js";
 
 const BARS = [
   ["x", "X, sideways", "How far the target went from side to side"],
@@ -87,7 +88,7 @@ export class Coverage {
       this.#element,
       h("p", { class: "hint" }, `${views} of run ${run.id}; green: the target was seen there, dark: it was not.`),
       h("div", { class: "bars" }, ...bars),
-      h("ul", { class: "faults" }, ...found.missing.map((each) => h("li", {}, each))),
+      h("ul", { class: "faults" }, ...found.missing.map((each) => h("li", {}, sentenceOf(each)))),
     );
   }
 }

@@ -22,6 +22,7 @@ export function mountHeader(page, banners) {
     setText(problems, state?.problems.join(" ") ?? "");
     if (state !== null) {
       setText(name, state.rig.name);
+      name.title = state.rig.name; // which may be cut off
       document.title = `${state.rig.name} – activecam`;
       tellConnection("live", whatGoesOn(state), "");
     } else {

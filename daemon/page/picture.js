@@ -215,7 +215,7 @@ class Health {
     if (!isNews && (kind !== this.#said || now - this.#refreshed < SETTLED)) return;
     this.#refreshed = now;
     const part = found && of > ids.length ? [`${ids.length} of its ${of} points are found.`] : [];
-    const details = [...part, ...faults.map((fault) => fault.message)];
+    const details = [...part, ...faults.map((fault) => sentenceOf(fault.message))];
     this.say(kind, isNews ? text : this.#words.textContent, details, found && !faults.length);
   }
 

@@ -162,7 +162,7 @@ function mountWarnings(element) {
   element.hidden = true;
   return ({ warnings }) => {
     element.hidden = warnings.length === 0;
-    for (const message of warnings.slice(list.children.length)) list.append(h("li", {}, message));
+    for (const message of warnings.slice(list.children.length)) list.append(h("li", {}, sentenceOf(message)));
   };
 }
 

@@ -51,6 +51,8 @@ def homed(page: Page, daemon: Daemon, api: httpx.Client) -> None:
             reading.replace("-", "−")
         )
     _let_the_picture_follow(page)
+    # At whatever size it was begun with: the click of a mouse would scroll to it.
+    page.get_by_role("button", name="Fit all into the picture").dispatch_event("click")
     page.get_by_label("Go to, pan").focus()
 
 

@@ -99,7 +99,7 @@ def test_a_calibration_from_the_checklist_to_the_verdict(
     expect(page.locator(".badge", has_text="held out")).to_have_count(2)
     warnings = page.get_by_role("region", name="Warnings").get_by_role("listitem")
     expect(warnings).to_have_count(2)
-    expect(warnings.first).to_contain_text("position 5 of 10 is left out")
+    expect(warnings.first).to_contain_text("Position 5 of 10 is left out")
     expect(page.get_by_text("2 of 4, 2 without the target")).to_be_attached()
     expect(page.locator(".verdict")).to_contain_text("held-out views are predicted to")
     expect(late.locator(".verdict")).to_be_visible()
