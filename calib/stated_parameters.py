@@ -1,7 +1,8 @@
 """A calibration's parameters one by one, as a person asks for them, each with its standard deviation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def stated_parameters(calibration: Calibration) -> list[StatedParameter]:
         *_of_joints(calibration, stds),
         *_of_dh(calibration),
         *_of_cameras(calibration, stds),
-        *_of_corrections(calibration, stds),
+        *_of_corrections(calibration),
     ]
 
 
@@ -92,16 +93,27 @@ def _of_cameras(calibration: Calibration, stds: dict[str, float]) -> list[Stated
     return rows
 
 
-def _of_corrections(calibration: Calibration, stds: dict[str, float]) -> list[StatedParameter]:
-    document = calibration.model_dump()
-    rows = []
-    for path, std in stds.items():
-        if path.startswith("corrections."):
-            value: Any = document
-            for key in path.split("."):
-                value = value[int(key)] if key.isdigit() else value[key]
-            rows.append(StatedParameter(path.removeprefix("corrections."), value, std, "", "none"))
-    return rows
+def _of_corrections(calibration: Calibration) -> list[StatedParameter]:
+    stated, units = calibration.corrections, {joint.name: joint.reading_unit for joint in calibration.joints}
+    rows: list[tuple[str, float, float | None, Unit]] = [
+        (f"{gap.joint}.half_gap", gap.half_gap, gap.half_gap_std, units[gap.joint]) for gap in stated.backlash
+    ]
+    for wave in stated.once_per_turn:
+        name, unit = f"{wave.joint}.once_per_turn", units[wave.joint]
+        rows.append((f"{name}.cosine", wave.cosine, wave.cosine_std, unit))
+        rows.append((f"{name}.sine", wave.sine, wave.sine_std, unit))
+    for share in stated.coupling:
+        per = f"{units[share.joint]}/{units[share.by]}"
+        rows.append((f"{share.joint}.coupling.{share.by}", share.factor, share.factor_std, per))
+    if stated.target_warp is not None:
+        warp = stated.target_warp
+        stds: Sequence[float | None] = warp.heights_std or len(warp.shapes) * [None]
+        rows += [
+            (f"target.warp.{shape}", height, std, "m")
+            for shape, height, std in zip(warp.shapes, warp.heights, stds, strict=True)
+        ]
+    rows += [(f"{one.camera}.aspect", one.aspect, one.aspect_std, "") for one in stated.aspect]
+    return [StatedParameter(*row, "none") for row in rows]
 
 
 def _si(kind: str) -> str:

@@ -10,6 +10,8 @@ const LABELS = {
   alpha_prev: "angle to the axis before",
   d_offset: "offset along the axis, at reading 0",
   theta_offset: "angle about the axis, at reading 0",
+  half_gap: "half the backlash",
+  aspect: "aspect of the given poses",
   fx: "focal length, x",
   fy: "focal length, y",
   cx: "principal point, x",
@@ -78,7 +80,7 @@ function predictionTable(found, axes) {
   return table(`Table ${found.number}: image points after ${found.joint} moved, predicted against measured`, columns, rows);
 }
 
-/** Return all parameters: a table for each joint and camera. */
+/** Return all parameters: a table for each joint and camera, and the target where it is not flat. */
 export function parameterTables(parameters) {
   const owners = new Map();
   for (const parameter of parameters) {
@@ -98,12 +100,15 @@ export function labelOf(entry) {
   if (name === "axis") return `axis, ${letter}`;
   if (name === "point") return `point of the axis, ${letter}`;
   if (name === "position") return `position at readings 0, ${letter}`;
+  if (name === "once_per_turn") return `error once per turn, ${letter}`;
+  if (name === "coupling") return `share of ${letter} that it follows`;
+  if (name === "warp") return `height of the shape ${letter}`;
   return LABELS[entry] ?? entry.replaceAll("_", " ");
 }
 
 /** Return a value, its standard deviation, and their unit: mm and degrees, with as many digits as mean something. */
 export function shown(value, std, unit) {
-  const [factor, name] = unit === "m" ? [1000, "mm"] : unit === "rad" ? [DEGREES, "°"] : [1, unit];
+  const [factor, name] = unit === "m" ? [1000, "mm"] : unit === "rad" ? [DEGREES, "°"] : [1, unit === "deg" ? "°" : unit];
   const digits = std ? Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(std * factor)))) : 6;
   if (std === 0) return [number(value * factor, 3), "as agreed", name]; // such as where an axis's zero is
   return [number(value * factor, digits), std === null ? "–" : number(std * factor, digits), name];

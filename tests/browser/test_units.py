@@ -129,3 +129,29 @@ def test_counts_stand_beside_what_they_are_worth(daemon: Daemon, open_page: Open
         expect(scaled).to_be_visible()
         shown = float((scaled.text_content() or "").strip("≈ °").replace("−", "-"))
         assert shown == pytest.approx(axis["position"] * joint["scale"] * 57.29578, abs=0.03)
+
+
+def test_parameters_have_names_for_people_and_measures_in_mm_and_degrees(
+    daemon: Daemon, open_page: Open
+) -> None:
+    page = open_page(daemon.address)
+    told = page.evaluate("""async () => {
+      const { labelOf, shown } = await import(new URL("page/paper_tables.js", document.baseURI));
+      return [
+        ["half_gap", "once_per_turn.sine", "coupling.slide", "warp.xx", "axis.z"].map(labelOf),
+        [shown(0.0004, 0.00002, "m"), shown(0.02, 0.001, "deg"), shown(-0.1, 0.01, "rad"), shown(0.5, null, "")],
+      ];
+    }""")
+    assert told[0] == [
+        "half the backlash",
+        "error once per turn, sine",
+        "share of slide that it follows",
+        "height of the shape xx",
+        "axis, z",
+    ]
+    assert told[1] == [
+        ["0.400", "0.020", "mm"],
+        ["0.0200", "0.0010", "°"],
+        ["−5.73", "0.57", "°"],
+        ["0.500000", "–", ""],
+    ]

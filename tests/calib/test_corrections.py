@@ -10,6 +10,7 @@ import pytest
 from calib import Calibration, load_calibration, save_calibration
 from calib.calibration import CALIBRATION_FORMAT
 from calib.errors import FormatError, ReadingsError
+from calib.stated_parameters import stated_parameters
 from calib.transforms import inverse, rotation_log
 from tests.calib.scenes import two_axis_rig
 
@@ -66,6 +67,26 @@ def corrected(readings: np.ndarray, sides: np.ndarray) -> np.ndarray:
     angle = np.radians(readings[:, 1])
     pan = readings[:, 1] + 0.02 * sides[:, 1] + 0.05 * (np.cos(angle) - 1) - 0.03 * np.sin(angle)
     return np.column_stack([readings[:, 0] + 0.004 * readings[:, 1], pan])
+
+
+def test_they_are_among_the_parameters_by_the_names_of_joints_and_with_their_units() -> None:
+    stds = {"half_gap_std": 0.001}
+    stated = {
+        **CORRECTIONS,
+        "backlash": [CORRECTIONS["backlash"][0] | stds],
+        "target_warp": {"shapes": ["xx"], "heights": [0.0004], "heights_std": [0.00002]},
+        "aspect": [{"camera": "main", "aspect": 0.002}],
+    }
+    ideal = {each.name for each in stated_parameters(calibration())}
+    found = [each for each in stated_parameters(calibration(corrections=stated)) if each.name not in ideal]
+    assert [(each.name, each.value, each.std, each.unit) for each in found] == [
+        ("pan.half_gap", 0.02, 0.001, "deg"),
+        ("pan.once_per_turn.cosine", 0.05, None, "deg"),
+        ("pan.once_per_turn.sine", -0.03, None, "deg"),
+        ("slide.coupling.pan", 0.004, None, "mm/deg"),
+        ("target.warp.xx", 0.0004, 0.00002, "m"),
+        ("main.aspect", 0.002, None, ""),
+    ]
 
 
 def twists(poses: np.ndarray, at: np.ndarray) -> np.ndarray:
