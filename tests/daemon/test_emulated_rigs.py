@@ -31,13 +31,16 @@ POSITION, ROTATION = 3e-4, 5e-4
 """Metres and radians that a pose may be off."""
 
 # Of what a rig takes its time for there is less. Pictures, which are rendered while axes move, are fewer and smaller,
-# but of a larger board; axes are faster and stand sooner; some views are left out.
+# but of a larger board, and need no more than one rendering each; axes are faster, stand sooner, and are asked more
+# often; some views are left out.
 PATIENT = ("[procedure]", '[procedure]\nframe_timeout = "60 s"')
 FEWER_PICTURES = ('frame_rate = "10 Hz"', 'frame_rate = "5 Hz"')
 CHANGES = {
     "grbl-table": (
         PATIENT,
         FEWER_PICTURES,
+        ('exposure = "8 ms"', 'exposure = "0.01 ms"'),
+        ("baud_rate = 115200", 'baud_rate = 115200\nreport_interval = "20 ms"'),
         ("width = 960", "width = 640"),
         ("height = 720", "height = 480"),
         ('fx = "905 px"', 'fx = "603 px"'),
@@ -57,6 +60,7 @@ CHANGES = {
     "cia402-pan-tilt": (
         PATIENT,
         FEWER_PICTURES,
+        ('exposure = "10 ms"', 'exposure = "0.01 ms"'),
         ("noise = 1.5", "noise = 0.75"),
         ("width = 1280", "width = 800"),
         ("height = 720", "height = 450"),
