@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.daemons import Daemon
+from tests.browser.test_accessibility import violations
 
 Open = Callable[..., Page]
 
@@ -26,12 +27,15 @@ def sign_in(page: Page, key: str) -> None:
     page.get_by_role("button", name="Sign in").click()
 
 
-def test_an_operator_signs_in_moves_and_signs_out(guarded: Daemon, open_page: Open) -> None:
-    page = open_page(guarded.address)
+def test_an_operator_signs_in_moves_and_signs_out(guarded: Daemon, open_page: Open, axe: str) -> None:
+    page = open_page(guarded.address, bypass_csp=True)
+    expect(page.get_by_label("Key")).to_be_focused()
+    assert violations(page, axe) == []
     sign_in(page, "activecam_wrong")
     expect(page.get_by_text("this key is not known here")).to_be_visible()
     sign_in(page, guarded.keys["operator"])
     expect(page.locator("#lease")).to_contain_text("operator, operator")
+    assert violations(page, axe) == []
     page.get_by_role("button", name="Home pan", exact=True).click()
     expect(page.get_by_role("article", name="Axis pan").locator(".condition")).to_have_text("homed")
     expect(page.locator("#lease")).to_contain_text("You have control")

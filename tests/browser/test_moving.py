@@ -118,6 +118,30 @@ def test_a_jog_that_is_held_goes_on_until_it_is_let_go(
     page.mouse.up()
 
 
+def test_a_finger_on_a_tablet_jogs_for_as_long_as_it_is_there(
+    daemon: Daemon, open_page: Open, api: httpx.Client
+) -> None:
+    page = open_page(daemon.address, viewport={"width": 800, "height": 1200}, has_touch=True)
+    forwards = card(page, "slide").get_by_role("button", name="Jog slide forwards")
+    expect(forwards).to_be_enabled()
+    forwards.scroll_into_view_if_needed()
+    box = forwards.bounding_box()
+    assert box is not None
+    finger = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+    screen = page.context.new_cdp_session(page)
+    screen.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [finger]})
+    while axis(api, "slide")["position"] < 8:
+        pass
+    screen.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    where = stands(api, "slide")
+    assert 8 < where < 95
+    expect(card(page, "slide").locator(".condition")).to_have_text("homed")  # the page knows that it stands
+    forwards.tap()
+    while stands(api, "slide") < where + 0.9:
+        pass
+    assert stands(api, "slide") == pytest.approx(where + 1, abs=0.2)
+
+
 def test_a_jog_that_is_held_ends_when_nobody_says_any_more_that_it_is(
     daemon: Daemon, open_page: Open, api: httpx.Client
 ) -> None:
