@@ -71,6 +71,7 @@ class GreyFit:
         return cls(*(np.concatenate([getattr(fit, field.name) for fit in fits]) for field in fields(cls)))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a piece that leads nowhere, which has not converged
 def fit_grey_values(
     picture: Picture,
     patches: Patches,
