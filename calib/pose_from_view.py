@@ -41,8 +41,8 @@ def _guesses(world: Array, flat: Array) -> list[tuple[Array, Array]]:
     # A plate that bulges has the two poses of a plane, from which each is refined with the bulge.
     nearly_flat = np.abs(world[:, 2]).max() <= NEARLY_FLAT * np.ptp(world[:, :2])
     guesses = _posed(world * [1, 1, 0], flat, cv2.SOLVEPNP_IPPE) if nearly_flat else []
-    # OpenCV has no number for a plane whose middle is seen right ahead.
-    guesses = guesses or _posed(world, flat, cv2.SOLVEPNP_SQPNP)
+    # Where a plane's middle is seen right ahead, OpenCV has no numbers for them, or wrong ones.
+    guesses += _posed(world, flat, cv2.SOLVEPNP_SQPNP)
     if not guesses:
         raise UnsolvableError(
             "no camera pose explains where the target's points are seen: are their ids right?"
