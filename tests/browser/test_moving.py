@@ -124,6 +124,9 @@ def test_a_finger_on_a_tablet_jogs_for_as_long_as_it_is_there(
     page = open_page(daemon.address, viewport={"width": 800, "height": 1200}, has_touch=True)
     forwards = card(page, "slide").get_by_role("button", name="Jog slide forwards")
     expect(forwards).to_be_enabled()
+    expect(page.locator("canvas").first).to_have_attribute(
+        "data-points", "20"
+    )  # above it, with its full height
     forwards.scroll_into_view_if_needed()
     box = forwards.bounding_box()
     assert box is not None
