@@ -14,7 +14,7 @@ const LACKING = "no picture";
 
 /** Fill `element` with the camera's picture, which is live while it is looked at. */
 export function mountPicture(element, page, signal) {
-  const canvas = h("canvas", { role: "img", "aria-label": "Live picture of the camera" });
+  const canvas = h("canvas", { role: "img", "aria-label": "Live picture of the camera", hidden: true });
   const empty = h("p", { class: "empty" }, "No picture");
   const rate = h("span", { class: "rate" });
   const words = h("p", { role: "status", class: "words" });
@@ -56,7 +56,8 @@ export function mountPicture(element, page, signal) {
 
   function show(bitmap, head = null) {
     empty.hidden = bitmap !== null;
-    canvas.hidden = bitmap === null;
+    canvas.hidden &&= bitmap === null;
+    canvas.style.visibility = bitmap === null ? "hidden" : ""; // its room stays: what is below must not move under a finger
     view.show(bitmap, head);
     if (head?.detection) health.follow(head.detection);
   }

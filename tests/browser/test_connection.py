@@ -16,11 +16,16 @@ def test_a_dead_daemon_looks_dead_and_comes_back_by_itself(daemon: Daemon, open_
     expect(canvas).to_have_attribute("data-points", "20")
     expect(home).to_be_enabled()
     page.evaluate("window.opened = true")
+    room = page.locator(".frame").bounding_box()
     daemon.kill()
     expect(page.get_by_role("alert").get_by_text("The daemon does not answer")).to_be_visible()
     expect(home).to_be_disabled()
     expect(canvas).to_be_hidden()
     expect(canvas).not_to_have_attribute("data-points", "20")
+    after = page.locator(".frame").bounding_box()
+    assert room is not None
+    assert after is not None
+    assert after["height"] == room["height"]  # what is below has not moved under anybody's finger
     expect(page.locator(".position").first).to_have_text("–")
     page.keyboard.press("Escape")
     expect(page.get_by_text("Use the switch that cuts the motors")).to_be_visible()
