@@ -30,6 +30,8 @@ DEFAULT_HOST: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
 GRACE: Final = 0.5
 """Seconds that clients have to take their answers at a shutdown, before they are hung up on."""
+FAREWELL: Final = 0.2
+"""Seconds of those in which streams say why they end."""
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """What ends the daemon, in order; a terminal that is closed sends the last."""
 LARGEST_MESSAGE: Final = 64 * 1024
@@ -65,6 +67,13 @@ class Server(uvicorn.Server):
         self._service.streams.close()
         self.exit_asked.set()
         super().handle_exit(sig, frame)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close connections, but let streams say first why they end; uvicorn would say that it starts again."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(FAREWELL):
+                await self._service.streams.ended()
+        await super().shutdown(sockets)
 
     def hang_up(self) -> None:
         """Drop the connections that there still are: a client that reads nothing never ends its own."""

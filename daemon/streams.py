@@ -16,12 +16,18 @@ class Streams:
 
     def __init__(self) -> None:
         self._closing = asyncio.Event()
+        self._none = asyncio.Event()
+        self._none.set()
         self.open = 0
         """How many streams there are now."""
 
     def close(self) -> None:
         """End all streams, and let no new one last."""
         self._closing.set()
+
+    async def ended(self) -> None:
+        """Return once there are none."""
+        await self._none.wait()
 
     async def follow(self, items: AsyncIterator[Item]) -> AsyncGenerator[Item | None]:
         """Yield `items`, and None after each HEARTBEAT of silence, until they end or the streams do."""
@@ -50,10 +56,13 @@ class Streams:
     @contextlib.contextmanager
     def _counted(self) -> Generator[None]:
         self.open += 1
+        self._none.clear()
         try:
             yield
         finally:
             self.open -= 1
+            if not self.open:
+                self._none.set()
 
 
 class _End:

@@ -23,7 +23,7 @@ from calib import load_session
 from daemon.errors import ServeError
 from daemon.operation.supervisor import Supervisor
 from daemon.rig import make_devices
-from daemon.server import _until_end, address_of, bind, serving
+from daemon.server import Server, _until_end, address_of, bind, serving
 from daemon.service import Service, running_service
 from drivers.errors import MotionStoppedError
 from tests.daemon.motions import home_all, until
@@ -170,6 +170,18 @@ async def test_open_streams_do_not_hold_up_the_end(service: Service) -> None:
     assert service.runs.active is None
     assert not service.rig.snapshot.moving
     assert service.streams.open == 0
+
+
+async def test_a_stream_says_why_it_ends_however_soon_the_server_does(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Server, "main_loop", lambda server: server.exit_asked.wait())
+    with bind("127.0.0.1", 0) as listening:
+        async with serving(service, listening):
+            pose = await connect(f"{address_of(listening).replace('http', 'ws')}/api/v1/pose/stream")
+            await pose.recv()
+        await pose.wait_closed()
+    assert pose.close_code == 1001
 
 
 async def test_clients_that_read_nothing_do_not_hold_up_the_end(
