@@ -4,7 +4,7 @@ picture      what a camera gave, as grey values to search and to measure in
 circle_grid  symmetric and asymmetric grids of disks;  ordering: of the blobs;  disks: centroids on the grey values
 chessboard   its inner corners
 charuco      chessboard corners, numbered by markers;  corners: both kinds' corners on the grey values,
-             crossings: what is to be seen there
+             crossings: what is to be seen there;  misfit: what covers a part of it
 markers      how OpenCV is to search for them
 aprilgrid    corners of tags;  tag_corners: where sides cross, on the grey values;  tag_sides: how these are seen,
              tag_strips: the pixels along them, tag_fit: drawings fitted;  pixel_edge: what pixels make of edges

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from calib.detection.crossings import UNMODELLED_VARIANCE, Crossings, crossings_of, fit_crossings
 from calib.detection.edge_profile import FIRST_BLUR
 from calib.detection.grey_fit import GreyFit, Light
+from calib.detection.misfit import uncovered
 from calib.detection.picture import Picture
 from calib.detection.plane import PlaneView, bent_view, span_a_plane
 from calib.detection.strips import Floats, Patches, Singles, strips
@@ -29,12 +30,7 @@ SHARED_NOISE = 4 * pi * SOFTENING**2  # pixels of a softened picture that have o
 MAY_MOVE = 4.0  # px from where a corner was thought to be; further off is another
 MUCH_BLURRED = 3.0  # times what most are; what is more so is no crossing of edges
 MISFIT = 0.3  # of the contrast; more and something else is in sight
-GOOD = 0.25  # of the corners, where a hand or the edge of something else covers the others
-COVERED = (
-    0.07,
-    4.0,
-)  # of the contrast, and times what good corners have; more and a part of the edges is covered
-MOST_CONTRAST = 2.5  # times what most have; more and a fit has made it up
+COVERED = 0.07  # of the contrast; less is left where nothing covers an edge
 AT_A_TIME = 40_000  # pixels: more are slower, fewer do not make up for the calls
 UNMEASURED_VARIANCE = 0.5**2  # px²; where the drawing does not fit
 
@@ -85,7 +81,7 @@ def measure_corners(
     blur = float(np.median(blurs))
     width = max(min(SHOWN * blur, float(np.median(crossings.clear)) - NEIGHBOURS_REACH * blur), NARROWEST)
     fit = _fit(picture, crossings, width, blurs, light)
-    found = _uncovered(fit, picture.noise, _shown(fit, picture.noise))
+    found = uncovered(fit.scatters, np.abs(fit.steps), picture.noise, _shown(fit, picture.noise), COVERED)
     scatter = fit.covariances[:, :2, :2] * (SHARED_NOISE if sharp else 1)
     return Corners(
         np.where(found[:, None], pixels + fit.parameters[:, :2], given),
@@ -115,18 +111,6 @@ def _shown(fit: GreyFit, noise: float) -> NDArray[np.bool_]:
     if shown.any():
         shown &= blurs < np.median(blurs[shown]) + np.log(MUCH_BLURRED)
     return shown
-
-
-def _uncovered(fit: GreyFit, noise: float, shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which of the fits (n,) that are `shown` (n,) have nothing but squares along their edges."""
-    if not shown.any():
-        return shown
-    contrasts, (least, times) = np.abs(fit.steps), COVERED
-    good = float(np.quantile(fit.scatters[shown] / contrasts[shown], GOOD))
-    misfits = np.hypot(2 * noise, max(least, times * good) * contrasts)
-    most = MOST_CONTRAST * float(np.median(contrasts[shown]))
-    uncovered: NDArray[np.bool_] = shown & (fit.scatters < misfits) & (contrasts < most)
-    return uncovered
 
 
 def _patches(picture: Picture, crossings: Crossings, width: float) -> tuple[Patches, tuple[Singles, Singles]]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.detection.misfit import uncovered
 from calib.detection.picture import Picture
 from calib.detection.plane import BentView, bent_view, view_of_plane
 from calib.detection.tag_fit import TagFit, first_look, fit_tags
@@ -27,6 +28,7 @@ MOST_MOVED, MAY_MOVE = 0.1, 3.0  # of a side, and px; more is another thing
 LEAST_CONTRAST = 3.0  # times the noise
 UNSETTLED = 200.0  # of the scatter: a step's gain in squares that is worth more than a few hundredths of a px
 MISFIT = 0.1  # of the contrast; more and something else is in sight
+COVERED = 0.012  # of the contrast; less is left where nothing covers a side
 UNMODELLED_VARIANCE = 0.002**2  # px²; the shape of the pixels and of the lens' blur
 
 
@@ -92,6 +94,7 @@ def _judged(picture: Picture, corners: Floats, sides: Sides, fit: TagFit) -> Tag
     found &= (fit.unsettled < UNSETTLED) & (fit.contrast > LEAST_CONTRAST * picture.noise)
     found &= fit.scatter < (2 * picture.noise) ** 2 + (MISFIT * fit.contrast) ** 2
     # Where a corner is out of the picture there is a side without its end, or none.
+    found = uncovered(np.sqrt(fit.scatter), fit.contrast, picture.noise, found, COVERED)
     found &= ((pixels > 0) & (pixels < np.array(picture.values.shape[::-1]) - 1)).all(axis=(1, 2))
     return TagCorners(pixels, covariances + UNMODELLED_VARIANCE * np.eye(2), found)
 

@@ -204,7 +204,7 @@ def test_corners_of_saturated_pictures_are_as_good_as_they_claim(target, gain):
         assert np.sqrt(np.square(off).mean()) < 0.03
 
 
-@pytest.mark.parametrize("target", [CHARUCO, CHESSBOARD], ids=["charuco", "chessboard"])
+@pytest.mark.parametrize("target", KINDS)
 def test_corners_beside_what_covers_the_board_are_left_out(target):
     """As under a hand, or at the edge of something in front: they were off by pixels, and claimed little."""
     drawn, random = draw(target, fill=0.6), np.random.default_rng(5)
