@@ -164,6 +164,7 @@ def gone(page: Page, daemon: Daemon, api: httpx.Client) -> None:
 
 def in_3d(page: Page, daemon: Daemon, api: httpx.Client) -> None:
     homed(page, daemon, api)
+    _scroll_to(page, "Rig in 3-D")  # it is asked for where it is looked at
     page.get_by_text("As a table").click()
     expect(page.get_by_role("row", name="camera main")).to_be_visible()
     _scroll_to(page, "Rig in 3-D")
