@@ -35,7 +35,7 @@ function facts({ calibration }) {
   const rows = [
     ["Held-out views predicted to", px(quality.held_out_rms_px)],
     ["Residual of the fit", px(quality.rms_px)],
-    ["Without views", left.length ? left.join(", ") : "none: all are used"],
+    ["Left out by hand", left.length ? left.map((number) => `view ${number}`).join(", ") : "no view"],
   ];
   return h("dl", { class: "facts" }, ...rows.map(([what, value]) => h("div", {}, h("dt", {}, what), h("dd", {}, value))));
 }

@@ -48,6 +48,7 @@ export function mountScene(element, page, signal) {
       if (!id || !isSeen || document.hidden) return;
       try {
         const found = await page.api.get(`calibrations/${id}/scene`, { signal });
+        if (page.live.state === null) return; // and what was found is of before
         if (found.calibration_id !== scene?.calibration_id) begin(found);
         scene = found;
         say("");
@@ -140,7 +141,11 @@ export function mountScene(element, page, signal) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw, { signal });
 
   page.follow((state) => {
-    if (state === null) return;
+    if (state === null) {
+      asked = null;
+      say("Where the rig stands is not known without a connection to the daemon.");
+      return;
+    }
     const { calibration_id: id, axes } = state.rig;
     const unknown = axes.filter(({ homed, position }) => !homed || position === null).map(({ name }) => name);
     const now = JSON.stringify([id, unknown, axes.map(({ position, tolerance }) => Math.round((10 * position) / tolerance))]);

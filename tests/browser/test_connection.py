@@ -27,12 +27,15 @@ def test_a_dead_daemon_looks_dead_and_comes_back_by_itself(daemon: Daemon, open_
     assert after is not None
     assert after["height"] == room["height"]  # what is below has not moved under anybody's finger
     expect(page.locator(".position").first).to_have_text("–")
+    in_3d = page.get_by_role("region", name="Rig in 3-D")
+    expect(in_3d).to_contain_text("not known without a connection")
     page.keyboard.press("Escape")
     expect(page.get_by_text("Use the switch that cuts the motors")).to_be_visible()
     daemon.start()
     expect(home).to_be_enabled()
     expect(canvas).to_have_attribute("data-points", "20")
     expect(page.get_by_text("The daemon does not answer. Nothing")).to_be_hidden()
+    expect(in_3d).to_contain_text("once the rig is calibrated")
     assert page.evaluate("window.opened")  # it was not loaded again
 
 

@@ -168,7 +168,7 @@ def test_views_are_dropped_solved_without_compared_and_the_better_one_used_with_
     expect(beside).to_contain_text("They agree")
     new, old = beside.get_by_role("article", name="This one"), beside.get_by_role("article", name="The other")
     expect(new).to_contain_text("2 views left out by hand")
-    expect(new.locator(".facts")).to_contain_text("1, 6")
+    expect(new.locator(".facts")).to_contain_text("view 1, view 6")
     expect(old).to_contain_text("In use")
     beside.get_by_text("What differs, in numbers").press("Enter")
     differing = beside.get_by_role("region", name=re.compile("Parameters that differ most"))
