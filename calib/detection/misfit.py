@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from calib.detection.strips import Floats
 
 GOOD = 0.25  # of the pieces, where a hand or the edge of something else covers the others
 MORE = 4.0  # times what good ones leave; lenses and prints that are drawn none too well make it 3 at the most

@@ -3,7 +3,7 @@
 import os
 
 # Before numpy loads its libraries, whose threads spin while they wait for each other: they take the processors from the
-# loop and the live picture, and with more than one a solution takes twice as long, beside other work five times.
+# loop, from the live picture and from each other.
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 

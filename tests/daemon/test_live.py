@@ -99,9 +99,9 @@ async def test_a_command_is_carried_out_under_the_lease_of_its_socket(service: S
         assert service.leases.current is None
 
 
-async def test_a_stop_waits_for_no_command_before_it(
-    service: Service, live: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> asyncio.Event:
+    """No motion begins until it is set."""
     begin, held = ClientMotions.begin, asyncio.Event()
 
     async def begin_late(*arguments: Any) -> Any:
@@ -109,6 +109,10 @@ async def test_a_stop_waits_for_no_command_before_it(
         return await begin(*arguments)
 
     monkeypatch.setattr(ClientMotions, "begin", begin_late)
+    return held
+
+
+async def test_a_stop_waits_for_no_command_before_it(live: str, held: asyncio.Event) -> None:
     async with connect(live) as socket:
         await ask(socket, do="lease", owner="anna")
         await socket.send(json.dumps({"id": "late", "do": "jog", "axis": "slide", "distance": 50}))
@@ -121,15 +125,8 @@ async def test_a_stop_waits_for_no_command_before_it(
 
 
 async def test_a_client_whose_commands_pile_up_may_still_stop(
-    service: Service, live: str, monkeypatch: pytest.MonkeyPatch
+    service: Service, live: str, held: asyncio.Event
 ) -> None:
-    begin, held = ClientMotions.begin, asyncio.Event()
-
-    async def begin_late(*arguments: Any) -> Any:
-        await held.wait()
-        return await begin(*arguments)
-
-    monkeypatch.setattr(ClientMotions, "begin", begin_late)
     jog = {"do": "jog", "axis": "slide", "distance": 5}
     async with connect(live) as socket:
         await ask(socket, do="lease", owner="anna")
