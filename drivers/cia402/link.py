@@ -57,7 +57,8 @@ class Link:
         return network
 
     async def open(self) -> None:
-        """Take the bus. Raises DeviceLostError."""
+        """Take the bus, and let go of it first where it was taken before. Raises DeviceLostError."""
+        await self.close()
         self._asking = ThreadPoolExecutor(1, "cia402")
         self._stopping = ThreadPoolExecutor(1, "cia402-stop")
         network = Network(self.options.silence)

@@ -9,6 +9,7 @@ from typing import Final
 from drivers.cia402.link import Link, Network
 from drivers.cia402.statusword import State, state_of
 from drivers.clock import Clock
+from drivers.errors import DeviceLostError
 
 SYNC: Final = 0x080
 STATE_AND_POSITION: Final = struct.Struct("<Hi")
@@ -76,12 +77,17 @@ class Sampler:
     async def sample(self, node: int) -> Sample | None:
         """Return what `node` says of an instant after this call; None where it is lost.
 
-        Raises DeviceLostError where the bus is.
+        Raises DeviceLostError where the bus is, and where it is let go meanwhile.
         """
         if self._next is None:
             self._next = asyncio.create_task(self._take())
             self._next.add_done_callback(_retrieve)
-        return (await asyncio.shield(self._next)).get(node)
+        sampling = self._next
+        # Not awaited itself: that it is given up would look as if whoever waits for it was cancelled.
+        await asyncio.wait([sampling])
+        if sampling.cancelled():
+            raise DeviceLostError(f"{self._link.name} was closed: open it first")
+        return sampling.result().get(node)
 
     async def _take(self) -> Mapping[int, Sample]:
         async with self._one_at_a_time:

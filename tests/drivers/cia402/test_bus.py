@@ -43,6 +43,17 @@ async def test_many_tasks_ask_at_once() -> None:
         await asyncio.gather(*(axis.read() for _ in range(50) for axis in rig.controller.axes.values()))
 
 
+async def test_who_waits_for_a_sample_while_the_bus_is_let_go_is_told_so_and_not_cancelled() -> None:
+    async with opened() as rig:
+        sampler = rig.controller._sampler
+        async with sampler._one_at_a_time:
+            asked = asyncio.create_task(sampler.sample(1))
+            await asyncio.sleep(0)
+            await sampler.close()
+            with pytest.raises(DeviceLostError, match=r"the CAN bus .* was closed: open it first"):
+                await asked
+
+
 async def test_lost_frames_cost_time_and_nothing_else() -> None:
     async with homed() as rig:
         rig.emulator.lossy("0.1")
@@ -235,6 +246,14 @@ async def test_a_drive_that_would_not_stop_by_itself_is_warned_of() -> None:
         (warning,) = rig.controller.warnings
         assert warning.startswith("axis 'pan': the drive at node 2")
         await rig.pan.home()
+
+
+async def test_a_bus_that_is_opened_again_leaves_no_thread() -> None:
+    before = set(threading.enumerate())
+    async with opened() as rig:
+        for _ in range(2):
+            await rig.controller.open()
+    assert not set(threading.enumerate()) - before
 
 
 async def test_a_stop_does_not_wait_behind_questions() -> None:
