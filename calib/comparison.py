@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 SURELY = 3.0
 """Standard deviations beyond which a difference is one."""
+SAME = 1e-9
+"""Metres and radians within which two poses are one: a sum's rounding, far below what can be measured."""
 MOST_JOINTS = 6
 """Up to so many joints the range is looked at in its middle, too, and not at its ends alone."""
 
@@ -188,6 +190,8 @@ def _sentence(
     moved_rad: float,
     parameters: Sequence[ParameterDifference],
 ) -> str:
+    if max(poses.position_max_m, poses.rotation_max_rad) < SAME:
+        return "They say the same: over the range that both have, every pose of the camera is equal"
     if poses.stds is None or apart.stds is None:
         return f"Over the range that both have, {_by(poses)}; how much is to be expected is not known"
     if poses.stds <= SURELY:

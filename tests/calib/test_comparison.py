@@ -55,6 +55,7 @@ def first() -> Calibration:
 def test_a_calibration_agrees_with_itself(first: Calibration) -> None:
     found = compare(first, first)
     assert (found.agree, found.agree_apart_from_world) == (True, True)
+    assert found.sentence.startswith("They say the same: ")
     assert found.poses.position_max_m == 0.0
     assert all(one.difference == 0.0 for one in found.parameters)
 
@@ -103,7 +104,7 @@ def test_a_rig_that_has_changed_is_said_to(first: Calibration) -> None:
 
 
 def test_without_deviations_nothing_is_promised(first: Calibration) -> None:
-    unsure = Calibration.model_validate(first.model_dump() | {"covariance": None})
+    unsure = Calibration.model_validate(calibrated(2).model_dump() | {"covariance": None})
     found = compare(unsure, first)
     assert (found.agree, found.poses.stds) == (None, None)
     assert found.sentence.endswith("how much is to be expected is not known")
