@@ -1,12 +1,15 @@
 """A small simulated rig in operation, in process, for each test that asks."""
 
 import asyncio
-from collections.abc import AsyncIterator
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
+import calib
 from daemon.api import create_app
 from daemon.profile import Profile
 from daemon.rig import Devices, Rig, make_devices
@@ -59,6 +62,23 @@ async def http(address: str) -> AsyncIterator[httpx.AsyncClient]:
     """A client over that socket, which shows no key of its own accord."""
     async with httpx.AsyncClient(base_url=f"{address}/api/v1", timeout=30) as client:
         yield client
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """While it is not set, whoever solves says that they look, and goes no further."""
+    free, solve = threading.Event(), calib.solve
+    free.set()
+
+    def held(*given: Any, progress: Callable[[str], None], **more: Any) -> Any:
+        if not free.is_set():
+            progress("looking")
+        free.wait()
+        return solve(*given, progress=progress, **more)
+
+    monkeypatch.setattr(calib, "solve", held)
+    yield free
+    free.set()
 
 
 def assert_nothing_left() -> None:

@@ -128,7 +128,7 @@ class TestASlowRig:
 
     @pytest.fixture
     def profile(self, tmp_path: Path) -> Profile:
-        return small_rig(tmp_path, time_scale=10.0, velocity=10.0)
+        return small_rig(tmp_path, time_scale=1.0, velocity=20.0)
 
     @pytest.fixture
     async def moving(

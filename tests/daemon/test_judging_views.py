@@ -1,5 +1,6 @@
 """A run's views as a person judges them: seen, left out, solved again without."""
 
+import threading
 from datetime import datetime
 from itertools import pairwise
 from typing import Any, cast
@@ -189,8 +190,9 @@ async def test_a_run_that_cannot_be_solved_without_them_stays_as_it_was(
 
 
 async def test_a_succeeded_run_whose_solving_is_cut_off_has_still_succeeded(
-    client: httpx.AsyncClient, service: Service, run: RunRecord
+    service: Service, run: RunRecord, solver: threading.Event
 ) -> None:
+    solver.clear()
     await service.runs.solve(run.id)
     assert [stored.state for stored in await service.store.runs()] == [RunState.SUCCEEDED]
     await service.runs.cancel(run.id)

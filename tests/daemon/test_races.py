@@ -14,7 +14,7 @@ from daemon.rig import Devices
 from daemon.service import Service, running_service
 from daemon.store import CalibrationRecord, RunRecord, RunState
 from drivers.axis import Axis
-from tests.daemon.motions import home_all
+from tests.daemon.motions import home_all, to_and_fro
 from tests.daemon.snapshots import VERSIONS, restore_snapshot
 
 EARLIER = "1087d24108964e429a2ba048f07a4efa"
@@ -60,7 +60,7 @@ async def test_who_acknowledges_a_stop_while_the_daemon_ends_moves_nothing(
 ) -> None:
     await home_all(service.rig)
     lease = service.leases.acquire("anna", "", 60.0)
-    await service.motions.begin(lease, ["slide"], partial(service.rig.move, {"slide": 90.0}))
+    await service.motions.begin(lease, ["slide"], to_and_fro(service.rig, "slide"))
     engaged = asyncio.Event()
     service.rig.latch.on_engage(lambda _: engaged.set())
     ending = asyncio.create_task(service.halt())

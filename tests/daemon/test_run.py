@@ -1,7 +1,7 @@
 """A whole run in process: begun, paused, cancelled."""
 
 import json
-from functools import partial
+import threading
 from pathlib import Path
 from typing import cast
 
@@ -25,7 +25,7 @@ from daemon.rig import Devices
 from daemon.service import Service, running_service
 from daemon.store import RunState
 from drivers.simulated import SimulatedController
-from tests.daemon.motions import until
+from tests.daemon.motions import to_and_fro, until
 from tests.daemon.rigs import small_rig
 from tests.daemon.runs import finish, of
 
@@ -133,11 +133,11 @@ async def test_a_run_whose_start_is_not_stored_leaves_its_starter_the_lease_and_
 
     monkeypatch.setattr(service.store, "add_run", full)
     lease = service.leases.acquire("anna", "", 60)
-    jog = await service.motions.begin(lease, ["slide"], partial(service.rig.jog, "slide", 90.0))
+    jog = await service.motions.begin(lease, ["slide"], to_and_fro(service.rig, "slide"))
     with pytest.raises(StoreError):
         await service.runs.start(token=lease.token)
     assert service.leases.current == lease
-    await service.motions.ended(jog)
+    assert not jog.done()
 
 
 async def test_a_paused_run_rests_between_two_views_and_goes_on(service: Service) -> None:
@@ -199,7 +199,11 @@ async def test_a_run_that_is_paused_in_its_last_view_rests_before_it_computes(se
     assert (await service.runs.get(run.id)).state is RunState.SUCCEEDED
 
 
-async def test_a_run_that_computes_is_not_paused(service: Service, client: httpx.AsyncClient) -> None:
+async def test_a_run_that_computes_is_not_paused(
+    service: Service, client: httpx.AsyncClient, solver: threading.Event
+) -> None:
+    solver.clear()
+
     async def refused() -> None:
         answer = await client.post(f"/runs/{run.id}/pause")
         assert (answer.status_code, answer.json()["code"]) == (409, "run_state")
@@ -210,7 +214,10 @@ async def test_a_run_that_computes_is_not_paused(service: Service, client: httpx
         if event.type == "solving":
             await refused()
             break
+    solver.set()
     await service.runs.wait(run.id)
+    solver.clear()
     await service.runs.solve(run.id)
     await refused()
+    solver.set()
     await service.runs.wait(run.id)

@@ -3,7 +3,6 @@
 import asyncio
 import threading
 from collections.abc import Callable
-from itertools import cycle
 from pathlib import Path
 from typing import cast
 
@@ -16,12 +15,12 @@ from daemon.errors import (
 )
 from daemon.procedure.events import Warned
 from daemon.profile import Profile
-from daemon.rig import Devices, Permit
+from daemon.rig import Devices
 from daemon.service import Service, running_service
 from daemon.store import RunRecord, RunState
 from drivers.camera import Frame
 from drivers.simulated import SimulatedController
-from tests.daemon.motions import until
+from tests.daemon.motions import to_and_fro, until
 from tests.daemon.runs import finish
 
 
@@ -132,12 +131,8 @@ async def test_an_alarm_while_the_axes_stand_fails_the_run_in_its_words(
 
 
 async def test_a_run_waits_until_what_its_starter_has_moved_stands(service: Service) -> None:
-    async def to_and_fro(permit: Permit) -> None:
-        for distance in cycle((9.0, -9.0)):
-            await service.rig.jog("slide", distance, permit)
-
     lease = service.leases.acquire("anna", "", 60)
-    jog = await service.motions.begin(lease, ["slide"], to_and_fro)
+    jog = await service.motions.begin(lease, ["slide"], to_and_fro(service.rig, "slide"))
     run, _ = await finish(service, await service.runs.start(token=lease.token))
     assert (run.state, run.error) == (RunState.SUCCEEDED, None)
     assert jog.cancelled()

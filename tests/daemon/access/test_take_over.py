@@ -16,7 +16,7 @@ from tests.daemon.rigs import small_rig
 @pytest.fixture
 def profile(tmp_path: Path) -> Profile:
     """A rig that is slow enough to be met on its way."""
-    return small_rig(tmp_path, velocity=1)
+    return small_rig(tmp_path, velocity=0.3)
 
 
 async def test_it_stops_what_the_former_holder_has_in_motion(
