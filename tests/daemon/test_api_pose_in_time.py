@@ -1,5 +1,6 @@
 """The pose at a past time: right within what it claims while axes move, and refused where nothing is known."""
 
+import asyncio
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -14,6 +15,7 @@ from daemon.profile import Profile
 from daemon.rig import Devices
 from daemon.rig.utc import rfc3339
 from daemon.service import Service
+from drivers.axis import AxisState
 from drivers.simulated import SimulatedController
 from tests.daemon.calibrations import calibrate
 from tests.daemon.motions import home_all, until
@@ -149,8 +151,12 @@ async def test_axes_that_fall_silent_are_a_503(
     calibration: Calibration,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    async def silent() -> AxisState:
+        await asyncio.Event().wait()
+        raise AssertionError
+
     impatient = replace(service.profile.procedure, max_reading_age=0.05)
     monkeypatch.setattr(service.rig, "profile", replace(service.profile, procedure=impatient))
-    cast(SimulatedController, devices.controllers["stage"]).inject("mute")
+    monkeypatch.setattr(devices.controllers["stage"].axes["slide"], "read", silent)
     answer = await ask(client, now())
     assert (answer.status_code, answer.json()["code"]) == (503, "reading_stale")

@@ -67,6 +67,7 @@ async def test_whoever_asks_how_often_the_store_is_written_to_once(
         await write()
 
     monkeypatch.setattr(service.store, "check_writable", counted)
+    monkeypatch.setattr(store_check, "KEPT", 3600.0)
     assert await asyncio.gather(*(ready(client) for _ in range(20))) == [(200, [])] * 20
     assert await ready(client) == (200, [])
     assert written == 1

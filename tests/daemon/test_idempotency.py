@@ -14,7 +14,7 @@ from daemon.api import create_app
 from daemon.errors import StoreError
 from daemon.profile import Profile
 from daemon.service import Service, running_service
-from tests.daemon.motions import home_all, until
+from tests.daemon.motions import home_all
 
 KEY = {"Idempotency-Key": '"8e03978e-40d5-43dd-bc93-6894a57f9324"'}
 
@@ -74,8 +74,18 @@ async def test_another_request_is_refused(service: Service, client: httpx.AsyncC
         assert code(await other) == (422, "idempotency_conflict")
 
 
-async def test_a_request_under_way_is_not_begun_again(service: Service, client: httpx.AsyncClient) -> None:
+async def test_a_request_under_way_is_not_begun_again(
+    service: Service, client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
     await home_all(service.rig)
+    under_way, over, ended = asyncio.Event(), asyncio.Event(), service.motions.ended
+
+    async def ended_late(motion: asyncio.Task[None]) -> None:
+        under_way.set()
+        await over.wait()
+        await ended(motion)
+
+    monkeypatch.setattr(service.motions, "ended", ended_late)
     headers = KEY | await take_lease(client)
 
     async def move() -> httpx.Response:
@@ -84,8 +94,9 @@ async def test_a_request_under_way_is_not_begun_again(service: Service, client: 
         )
 
     first = asyncio.create_task(move())
-    await until(service.rig, lambda rig: rig.moving)
+    await under_way.wait()
     assert code(await move()) == (409, "idempotency_in_progress")
+    over.set()
     assert (await first).status_code == 200
     assert (await move()).content == (await first).content
 

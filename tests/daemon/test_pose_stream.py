@@ -10,7 +10,7 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 
 from daemon.api import pose_stream
-from daemon.rig import Devices
+from daemon.rig import Devices, controller_owner
 from daemon.rig.utc import rfc3339
 from daemon.service import Service
 from drivers.simulated import SimulatedController
@@ -38,18 +38,23 @@ async def receive(socket: ClientConnection) -> dict[str, Any]:
     return message
 
 
-def times_read(service: Service) -> int:
-    return max(axis.number for axis in service.rig.snapshot.axes)
-
-
-async def test_every_reading_is_a_message(service: Service, address: str, stream: str) -> None:
+async def test_every_reading_is_a_message(
+    service: Service, address: str, stream: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = service.rig
+    monkeypatch.setattr(
+        controller_owner, "POLL_PERIOD", 3600.0
+    )  # the axes are read when this test asks for it
+    await rig.fresh_snapshot(rig.clock.now())
     async with connect(address + stream) as socket:
-        first = times_read(service)
-        poses = [await receive(socket) for _ in range(20)]
-        read = times_read(service) - first
-    # None is left out unsaid but those still under way; controllers read at different times give more messages.
-    assert sum(1 + pose["dropped"] for pose in poses) >= read - 5
-    assert sum(pose["dropped"] for pose in poses) < 10  # a busy machine may be late now and then
+        poses = [await receive(socket)]
+        for _ in range(20):
+            timestamp = (await rig.fresh_snapshot(rig.clock.now())).timestamp
+            assert timestamp is not None
+            while poses[-1]["timestamp"] < rfc3339(rig.utc.at(timestamp)):
+                poses.append(await receive(socket))
+    assert [pose["dropped"] for pose in poses] == [0] * len(poses)
+    assert len(poses) > 20
     assert all(pose["covariance"] is not None for pose in poses)
 
 

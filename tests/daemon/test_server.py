@@ -146,6 +146,14 @@ async def test_the_picture_is_live(http: httpx.AsyncClient) -> None:
                 break
 
 
+@pytest.fixture
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clients that take their answers are given the time for it on any machine."""
+    monkeypatch.setattr("daemon.server.FAREWELL", 60.0)
+    monkeypatch.setattr("daemon.server.GRACE", 60.0)
+
+
+@pytest.mark.usefixtures("unhurried")
 async def test_open_streams_do_not_hold_up_the_end(service: Service) -> None:
     listening = bind("127.0.0.1", 0)
     address = address_of(listening)
@@ -172,6 +180,7 @@ async def test_open_streams_do_not_hold_up_the_end(service: Service) -> None:
     assert service.streams.open == 0
 
 
+@pytest.mark.usefixtures("unhurried")
 async def test_a_stream_says_why_it_ends_however_soon_the_server_does(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -205,7 +214,7 @@ async def test_an_error_in_the_program_ends_it_with_axes_that_stand(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     profile = small_rig(
-        tmp_path, time_scale=5, velocity=10
+        tmp_path, time_scale=1, velocity=20
     )  # the motion lasts for seconds of the machine's time
     devices = make_devices(profile)
 
