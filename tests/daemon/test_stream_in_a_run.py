@@ -47,8 +47,8 @@ async def emulator(profile: Profile, simulated: Devices) -> AsyncIterator[Stream
 def devices(
     request: pytest.FixtureRequest, profile: Profile, simulated: Devices, emulator: StreamEmulator
 ) -> Devices:
-    patience = getattr(request, "param", "2 s")
-    options = StreamOptions(url=emulator.url, latency="1 s", exposure="10 ms", timeout=patience)
+    durations = {"exposure": "10 ms", "latency": "1 s", "timeout": "2 s"} | getattr(request, "param", {})
+    options = StreamOptions(url=emulator.url, **durations)
     context = DriverContext(simulated.clock)
     return dataclasses.replace(simulated, camera=StreamCamera.create(profile.camera.spec, options, context))
 
@@ -99,14 +99,16 @@ async def test_a_camera_that_fails_ends_the_run_in_words_and_is_found_again(
     assert not after.moving
 
 
-@pytest.mark.parametrize("devices", ["30 s"], indirect=True)  # of a machine that has other things to do
+@pytest.mark.parametrize(
+    "devices", [{"latency": "1.6 s", "timeout": "30 s"}], indirect=True
+)  # of a machine that has other things to do
 async def test_a_run_through_a_stream_that_falls_behind_finds_the_truth(
     service: Service, emulator: StreamEmulator
 ) -> None:
     run = await service.runs.start("anna", "by the network")
     async for event in service.runs.events(run.id):
         if event.type == "joint" and event.joint == "pan":
-            emulator.delay(0.5)
+            emulator.delay(0.8)
     ended = await service.runs.get(run.id)
     assert ended.error is None
     world = service.rig.world
