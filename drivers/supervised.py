@@ -183,12 +183,18 @@ class SupervisedAxis(ABC):
         await self._check_arrival(target)
 
     async def _standstill(self, deadline: float = math.inf) -> bool:
-        """Wait until the device says that the axis stands; return False where `deadline` comes first."""
-        while not await self._stands():
-            if self._clock.now() >= deadline:
+        """Wait until the device says that the axis stands; return False where `deadline` comes first.
+
+        What counts is what it says when it is asked after the deadline: an older answer may have waited for a program
+        that was held up.
+        """
+        while True:
+            late = self._clock.now() >= deadline
+            if await self._stands():
+                return True
+            if late:
                 return False
             await self._clock.sleep(self._poll)
-        return True
 
     async def _check_arrival(self, target: float | None) -> None:
         position = await self._where()

@@ -232,15 +232,17 @@ class Cia402Axis(SupervisedAxis):
         Raises MotionStoppedError, and DeviceFaultError where the drive is not enabled, unless it may be `in_fault`.
         """
         end = self._clock.now() + time
-        while not until(sample := await self._drive.sample()):
+        while True:
+            late = self._clock.now() >= end
+            if until(sample := await self._drive.sample()):
+                return True
             self._drive.require_permit(permit)
             if not in_fault:
                 await self._require_no_fault(sample)
                 self._require_enabled(sample)
-            if self._clock.now() >= end:
+            if late:
                 return False
             await self._clock.sleep(self._poll)
-        return True
 
     async def _fault_of(self, sample: Sample) -> str | None:
         if sample.state not in {State.FAULT, State.FAULT_REACTION}:

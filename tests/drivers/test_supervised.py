@@ -130,6 +130,21 @@ async def test_a_motion_without_end_is_stopped_after_its_time() -> None:
     assert axis.told == ["move 50", "halt"]
 
 
+async def test_a_program_that_was_held_up_asks_once_more_before_it_calls_a_motion_endless() -> None:
+    class Held(TalkingAxis):
+        """Its answer that it moves is heard a minute later, when it has long come to its end."""
+
+        async def _stands(self) -> bool:
+            stood, self.moving = not self.moving, False
+            await self._clock.sleep(60.0)
+            return stood
+
+    axis = Held()
+    axis.gate = asyncio.Event()
+    await axis.move(50.0)
+    assert axis.told == ["move 50"]
+
+
 async def test_an_axis_that_does_not_stop_is_said_to_run_on() -> None:
     axis = moving_axis()
     axis.deaf = True
