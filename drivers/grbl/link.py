@@ -27,6 +27,7 @@ _RETRY: Final = 1.0
 _OWN_BANNER: Final = 0.5
 """Seconds in which a controller restarts of itself after an alarm, if it does."""
 _SLICES: Final = 20
+"""Parts in which a time to wait passes, so that one in which this program was held up is not laid to the controller."""
 _BANNER = re.compile(r"Grbl(HAL)? \d", re.ASCII | re.IGNORECASE)
 
 Answer = TypeVar("Answer")
@@ -89,21 +90,22 @@ class Link:
         self._opening = True
         self._ready.clear()
         try:
-            async with asyncio.timeout(self._options.start_timeout):
-                while not self._ready.is_set():
-                    self._wire.write(RESET)
-                    await self._is_ready_within(_RETRY)
-        except TimeoutError:
-            self._wire.lose(
-                f"what is at {self._options.port} does not speak as Grbl does: check the port and 'baud_rate'"
-                if self._wire.anything_heard
-                else f"nothing at {self._options.port} says that it is Grbl: check the controller's power"
-            )
+            left = self._options.start_timeout
+            while left > 0 and not self._ready.is_set():
+                self._wire.write(RESET)
+                await self._is_ready_within(min(left, _RETRY))
+                left -= _RETRY
         except BaseException:
             await finish(self.close())
             raise
         finally:
             self._opening = False
+        if not self._ready.is_set():
+            self._wire.lose(
+                f"what is at {self._options.port} does not speak as Grbl does: check the port and 'baud_rate'"
+                if self._wire.anything_heard
+                else f"nothing at {self._options.port} says that it is Grbl: check the controller's power"
+            )
         self._wire.require_open()
 
     async def close(self) -> None:
@@ -157,9 +159,9 @@ class Link:
             await self._wait_until_ready()
             if halts is not None and halts != self.halts:
                 raise MotionStoppedError(f"'{line}' was not sent, because of a stop")
+            self._wire.write(f"{line}\n".encode())
             request = self._request = _Request(line, asyncio.get_running_loop().create_future())
             try:
-                self._wire.write(f"{line}\n".encode())
                 await _within(patience, request.answered)
             except TimeoutError:
                 self._is_silent(patience)
@@ -183,10 +185,10 @@ class Link:
                 self._next_report = None
 
     async def _ask_once(self) -> tuple[Report, float]:
-        self._report = asyncio.get_running_loop().create_future()
         self._asked_at = self._clock.now()
+        self._wire.write(b"?")
+        self._report = asyncio.get_running_loop().create_future()
         try:
-            self._wire.write(b"?")
             return await _within(self._options.answer_timeout, self._report), self._asked_at
         except TimeoutError:
             self._is_silent(self._options.answer_timeout)
@@ -260,9 +262,12 @@ class Link:
         self._revival = asyncio.ensure_future(wait())
 
     async def _is_ready_within(self, seconds: float) -> bool:
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                await self._ready.wait()
+        for _ in range(_SLICES):
+            if self._ready.is_set():
+                break
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(seconds / _SLICES):
+                    await self._ready.wait()
         return self._ready.is_set()
 
     def _fail(self, error: Exception) -> None:
@@ -288,10 +293,7 @@ class Link:
 
 
 async def _within(patience: float, answer: "asyncio.Future[Answer]") -> Answer:
-    """Return an answer that comes within `patience` seconds. Raises TimeoutError.
-
-    They pass in slices, so that a time in which this program itself was held up is not laid to the controller.
-    """
+    """Return an answer that comes within `patience` seconds, which pass in slices. Raises TimeoutError."""
     for _ in range(_SLICES):
         done, _ = await asyncio.wait([answer], timeout=patience / _SLICES)
         if done:

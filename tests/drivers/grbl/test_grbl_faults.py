@@ -1,6 +1,7 @@
 """Every fault of a serial line in every phase: nothing hangs, nothing moves afterwards, and it is said in words."""
 
 import asyncio
+import gc
 from collections.abc import Awaitable, Callable, Mapping
 
 import pytest
@@ -42,10 +43,10 @@ async def at_rest(table: Table) -> float:
     async with asyncio.timeout(BOUND):
         while True:
             before = table.shaft()
-            await asyncio.sleep(0.1)
+            await table.world.clock.sleep(0.1)
             if table.shaft() == before:
                 break
-    await asyncio.sleep(0.3)
+    await table.world.clock.sleep(0.3)
     assert table.shaft() == before
     return before
 
@@ -184,6 +185,24 @@ async def test_a_motion_that_was_not_answered_is_not_sent_again() -> None:
             await table.slide.move(55.0)
         assert await at_rest(table) == stood
         assert sent.count(b"$J") == 1
+
+
+@pytest.mark.parametrize("question", ["status", "line"])
+async def test_a_port_that_takes_nothing_is_an_error_for_whoever_writes_and_for_nobody_else(
+    question: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_data: bytes) -> None:
+        raise DeviceLostError("the port is gone")
+
+    async with homed() as table:
+        left: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _loop, context: left.append(context))
+        link = table.slide._machine._link
+        monkeypatch.setattr(link._wire._port, "write", fail)
+        with pytest.raises(DeviceLostError, match="the port is gone"):
+            await (link.status() if question == "status" else link.ask("$I"))
+        gc.collect()
+        assert left == []  # no error that was never retrieved
 
 
 async def test_lost_steps_are_found_by_homing_alone() -> None:
