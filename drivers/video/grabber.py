@@ -61,8 +61,9 @@ class Grabber:
         await asyncio.wait([self._news], timeout=self._timeout)
 
     async def stop(self) -> None:
-        """Return when the thread has let the source go."""
+        """Return when the thread has let the source go; who waits for news finds at once that there are none."""
         self._stopping.set()
+        self._wake()
         limit = self._timeout + JOIN_LIMIT
         await asyncio.to_thread(self._thread.join, limit)
         if self._thread.is_alive():

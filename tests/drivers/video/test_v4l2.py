@@ -195,6 +195,20 @@ async def test_closing_does_not_wait_for_a_frame_that_never_comes() -> None:
     assert rig.capture.released == rig.node.closed == 1
 
 
+async def test_who_waits_for_a_frame_is_told_when_the_camera_is_closed() -> None:
+    rig = Rig(timeout="1 min")
+    async with rig.open() as camera:
+        rig.capture.mute = True
+        rig.capture.read_once.clear()
+        assert await asyncio.to_thread(rig.capture.read_once.wait, 30)  # no frame is on its way any more
+        waiting = asyncio.create_task(camera.frame(after=time.monotonic() + 60))
+        await asyncio.sleep(0)
+    await asyncio.wait([waiting], timeout=20)
+    assert waiting.done()
+    with pytest.raises(DeviceLostError, match="camera 'eye' is not open: open it first"):
+        await waiting
+
+
 async def test_a_library_that_does_not_return_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(grabber, "JOIN_LIMIT", 0.1)
     rig = Rig(timeout="200 ms")
