@@ -10,7 +10,6 @@ from tests.browser.daemons import Daemon
 from tests.browser.test_accessibility import violations
 from tests.daemon.rigs import write_profile
 
-expect.set_options(timeout=20_000)
 Open = Callable[..., Page]
 VIEWS = 8
 """Of 10 positions; at the ends of the pan's sweep the target is out of the picture."""
@@ -28,7 +27,7 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 @pytest.fixture
 def api(daemon: Daemon) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=30) as client:
+    with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60) as client:
         yield client
 
 

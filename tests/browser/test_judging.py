@@ -13,7 +13,6 @@ from tests.browser.daemons import Daemon
 from tests.daemon.rigs import write_profile
 
 Open = Callable[..., Page]
-expect.set_options(timeout=30_000)
 
 
 def calibrate(api: httpx.Client) -> dict[str, Any]:

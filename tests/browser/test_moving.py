@@ -17,7 +17,7 @@ Open = Callable[..., Page]
 @pytest.fixture
 def api(daemon: Daemon) -> Iterator[httpx.Client]:
     """The same daemon without the page: nothing is latched, nobody has control, and all is homed."""
-    with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=20) as client:
+    with httpx.Client(base_url=f"{daemon.address}api/v1", timeout=60) as client:
         client.post("/stop/acknowledge")
         lease = client.post("/lease", json={"owner": "the test", "take_over": True}).json()
         shown = {"X-Lease": lease["token"]}

@@ -22,7 +22,6 @@ from tests.daemon.export.test_report import Page as Html
 from tests.daemon.export.test_urdf import robot_of
 from tests.daemon.rigs import write_profile
 
-expect.set_options(timeout=20_000)
 Open = Callable[..., Page]
 
 
