@@ -114,7 +114,7 @@ class CameraContract(ABC):
         if bench.unplug is None:
             return
         async with _opened(bench) as camera:
-            waiting = asyncio.create_task(camera.frame(after=bench.clock.now() + 1.0))
+            waiting = asyncio.create_task(camera.frame(after=bench.clock.now() + 60.0))
             await bench.clock.sleep(0.1)
             bench.unplug()
             with refused(DeviceLostError):

@@ -8,7 +8,6 @@ from dataclasses import replace
 import pytest
 import serial
 
-from drivers.clock import SystemClock
 from drivers.contract import AxisBench, AxisContract
 from drivers.discovery.machine import Machine
 from drivers.discovery.serial_ports import serial_ports
@@ -92,7 +91,9 @@ class TestOnAGadget(AxisContract):
         self.board = board
 
     def bench(self) -> AxisBench:
-        return AxisBench(self.board.table.controller, "slide", SystemClock(), self.board.unplug)
+        return AxisBench(
+            self.board.table.controller, "slide", self.board.table.world.clock, self.board.unplug
+        )
 
 
 async def homed(board: Board) -> Table:

@@ -12,12 +12,12 @@ from drivers.axis import AxisSpec
 from drivers.cia402.axis import Cia402Axis
 from drivers.cia402.controller import Cia402Controller
 from drivers.cia402.options import Cia402AxisOptions, Cia402Options
-from drivers.clock import SystemClock
 from drivers.driver import DriverContext
 from drivers.emulators.cia402.emulator import Cia402Emulator
 from drivers.simulated.options import SimulationOptions
 from drivers.simulated.world import SimulatedWorld
 from tests.drivers import rigs
+from tests.drivers.clocks import PatientClock
 
 SLIDE = AxisSpec("slide", "prismatic", "mm", (-20.0, 20.0), 60.0, 600.0, 0.01)
 """Its drive counts micrometres, and says so."""
@@ -31,9 +31,10 @@ class Rig:
     """The emulator and the controller of one bus."""
 
     def __init__(self, slide: dict[str, Any], pan: dict[str, Any], **options: Any) -> None:
-        clock = SystemClock()
+        clock = PatientClock()
         specs = {"slide": SLIDE, "pan": PAN}
-        options = {"interface": "virtual", "channel": f"test-{next(_channels)}"} | options
+        # Drives and driver share this program: a loss is waited for by tests that want one.
+        options = {"interface": "virtual", "channel": f"test-{next(_channels)}", "silence": "4 s"} | options
         axes = {
             "slide": Cia402AxisOptions.model_validate({"node": 1} | slide),
             "pan": Cia402AxisOptions.model_validate({"node": 2} | pan),

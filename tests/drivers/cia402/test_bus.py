@@ -232,10 +232,10 @@ async def test_drives_stop_by_themselves_when_activecam_is_gone() -> None:
         rig.emulator.unplug()
         with pytest.raises(DeviceLostError):
             await move
-        await asyncio.sleep(1.5 * SILENCE)
+        await rig.clock.sleep(1.5 * SILENCE)
         stands = rig.reading("slide")
         assert rig.emulator.nodes["slide"].servo.error_code == 0x8130
-        await asyncio.sleep(0.2)
+        await rig.clock.sleep(0.2)
         assert rig.reading("slide") == stands < 18.0
 
 
@@ -283,7 +283,7 @@ async def test_nothing_is_sent_to_an_axis_after_its_stop() -> None:
             await rig.slide.stop()
             with pytest.raises(MotionStoppedError):
                 await move
-            await asyncio.sleep(0.5)
+            await rig.clock.sleep(0.5)
             assert tap.controlwords(1)[-1] == 0x010F
         assert rig.reading("slide") == pytest.approx(0.0)
 

@@ -16,7 +16,7 @@ class OnTheBus(AxisContract):
 
     @pytest.fixture(autouse=True)
     async def switched_on(self) -> AsyncIterator[None]:
-        self.rig = Rig(self.axis_options, self.axis_options, **self.options)
+        self.rig = Rig(self.axis_options, self.axis_options, silence="1 s", **self.options)
         await self.rig.start()
         yield
         await self.rig.emulator.close()

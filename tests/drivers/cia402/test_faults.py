@@ -37,15 +37,17 @@ PHASES: Mapping[str, Callable[[Rig], Awaitable[None]]] = {
 
 
 async def expect_rest_and_recovery(rig: Rig, fault: str) -> None:
-    # A drive that nobody reaches stops when it hears nothing of activecam; the others are braking already.
-    await asyncio.sleep(1.5 * SILENCE if fault in UNREACHABLE else 0.3)
-    stands = rig.reading("slide")
-    await asyncio.sleep(0.1)
+    if fault in UNREACHABLE:
+        await rig.clock.sleep(1.5 * SILENCE)  # the drive stops when it hears nothing of activecam
+    stands = None
+    while stands != (stands := rig.reading("slide")):  # some brake for a second
+        await rig.clock.sleep(0.1)
+    await rig.clock.sleep(0.1)
     assert rig.reading("slide") == stands
     assert stands < 17.0  # nobody went on to the target
     await rig.controller.close()
     rig.emulator.repair()
-    await asyncio.sleep(0.1)
+    await rig.clock.sleep(0.1)
     await rig.controller.open()
     assert rig.reading("slide") == stands  # opening moves nothing
     rig.emulator.nodes["slide"].set_data(0x6099, 1, FAST)
@@ -83,7 +85,7 @@ async def expect_failure_while_stopping(fault: str) -> None:
         motion = asyncio.ensure_future(rig.slide.move(18.0))
         await under_way(rig, rig.slide)
         stop = asyncio.create_task(rig.slide.stop())
-        await asyncio.sleep(0.05)
+        await rig.clock.sleep(0.05)
         inject(rig)
         ended, stopped = await asyncio.gather(motion, stop, return_exceptions=True)
         assert isinstance(ended, DriverError)

@@ -118,7 +118,7 @@ async def test_a_stop_returns_when_the_axis_stands_and_leaves_the_motor_enabled(
             assert tap.controlwords(1)[-1] == 0x010F  # halt, which is no quick stop
         sample = await rig.controller._drives["slide"].sample()
         assert (sample.velocity, sample.state) == (0, State.ENABLED)
-        await asyncio.sleep(0.2)
+        await rig.clock.sleep(0.2)
         assert rig.reading("slide") == stands < 18.0
 
 
@@ -276,8 +276,8 @@ async def test_the_drive_gets_the_profile_s_velocity_and_acceleration() -> None:
 
 
 async def test_closing_switches_the_motor_off() -> None:
-    async with homed() as rig:
+    async with homed(silence="1 s") as rig:
         assert rig.emulator.nodes["slide"].servo.state == "enabled"
         await rig.controller.close()
-        await asyncio.sleep(1.5)  # and the drive does not mind that nobody is there any longer
+        await rig.clock.sleep(1.5)  # and the drive does not mind that nobody is there any longer
         assert rig.emulator.nodes["slide"].servo.state == "ready"

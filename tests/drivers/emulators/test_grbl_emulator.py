@@ -13,7 +13,7 @@ from drivers.emulators.control import describe, obey
 from drivers.emulators.emulator import Emulator
 from drivers.emulators.grbl.gcode import CodeError, parse
 from tests.drivers.emulators.terminals import Terminal, terminal
-from tests.drivers.grbl.benches import Table, make
+from tests.drivers.grbl.benches import SLOW_HOMING, Table, make, moving, until
 
 LOCKED = "[MSG:'$H'|'$X' to unlock]"
 BANNER = "Grbl 1.1h ['$' for help]"
@@ -94,11 +94,12 @@ async def test_the_planner_holds_15_blocks_and_then_keeps_its_ok() -> None:
 
 
 async def test_what_comes_while_a_setting_is_written_is_lost() -> None:
-    async with ready() as (_, port):
+    async with ready() as (table, port):
         port.forget()
         port.send("$130=70\n")
-        await asyncio.sleep(0.01)
-        port.send("?")
+        while not table.emulator.firmware._writing:  # noqa: ASYNC110  it tells nobody
+            await asyncio.sleep(0)
+        table.emulator.firmware.receive(b"?")
         await port.heard("ok")
         assert port.lines == ["ok"]
         await port.answer("$$")
@@ -106,9 +107,9 @@ async def test_what_comes_while_a_setting_is_written_is_lost() -> None:
 
 
 async def test_a_hold_slows_down_first_and_goes_on_only_from_a_stand() -> None:
-    async with ready({120: 100}) as (_, port):
+    async with ready({120: 100}) as (table, port):
         await port.answer("G1X-60F6000")
-        await asyncio.sleep(0.3)
+        await table.world.clock.sleep(0.3)
         port.send(b"!")
         assert (await port.report()).startswith("<Hold:1|")
         port.send(b"~")
@@ -125,9 +126,9 @@ async def test_a_hold_slows_down_first_and_goes_on_only_from_a_stand() -> None:
 
 
 async def test_a_reset_from_a_hold_keeps_the_position_without_an_alarm() -> None:
-    async with ready() as (_, port):
+    async with ready() as (table, port):
         await port.answer(f"G1{FAR}")
-        await asyncio.sleep(0.2)
+        await moving(table)
         port.send(b"!")
         held = (await port.state("Hold:0")).split("|")[1]
         port.forget()
@@ -138,9 +139,9 @@ async def test_a_reset_from_a_hold_keeps_the_position_without_an_alarm() -> None
 
 
 async def test_a_reset_in_motion_is_alarm_3() -> None:
-    async with ready() as (_, port):
+    async with ready() as (table, port):
         await port.answer(f"G1{FAR}")
-        await asyncio.sleep(0.1)
+        await moving(table)
         port.forget()
         port.send(b"\x18")
         await port.heard("ALARM:3", BANNER, LOCKED)
@@ -153,13 +154,13 @@ async def test_a_jog_that_is_held_or_cancelled_slows_down_and_is_forgotten(byte:
     async with ready() as (table, port):
         await port.answer(f"$J=G90{FAR}")
         await port.answer("$J=G90X0F3000")
-        await asyncio.sleep(0.2)
+        await moving(table)
         port.send(byte)
         await port.state("Idle")
         before = table.shaft()
         await asyncio.sleep(0.1)
         assert table.shaft() == before
-        assert -50 < table.emulator.motors["slide"].position < -1
+        assert -50 < table.emulator.motors["slide"].position < 0
 
 
 async def test_a_jog_out_of_the_travel_is_only_refused() -> None:
@@ -185,7 +186,7 @@ async def test_a_move_out_of_the_travel_is_alarm_2_and_deafness_until_a_reset() 
 async def test_a_limit_switch_is_alarm_1_and_deafness_until_a_reset() -> None:
     async with ready() as (table, port):
         await port.answer(f"$J=G90{FAR}")
-        await asyncio.sleep(0.1)
+        await moving(table)
         port.forget()
         table.emulator.limit()
         await port.heard("ALARM:1")
@@ -200,10 +201,10 @@ async def test_a_limit_switch_is_alarm_1_and_deafness_until_a_reset() -> None:
 
 
 async def test_a_reset_while_homing_is_alarm_6_and_a_stale_ok() -> None:
-    async with locked() as (_, port):
+    async with locked(SLOW_HOMING) as (table, port):
         port.forget()
         port.send("$H\n")
-        await asyncio.sleep(0.1)
+        await moving(table)
         port.send(b"\x18")
         await port.heard("ALARM:6", "ok", BANNER, LOCKED)
 
@@ -225,7 +226,7 @@ async def test_opening_the_port_restarts_an_arduino_and_its_position_is_0() -> N
             pass  # a second program does not restart it: only the first one that opens the port does
         assert (await port.report()).startswith("<Idle|MPos:-50.000")
         port.hang_up()
-        await asyncio.sleep(0.1)
+        await until(lambda: not table.emulator.port._listening)
         async with terminal(str(table.emulator.port.path)) as again:
             await again.heard(BANNER, LOCKED)
             assert (await again.report()).startswith("<Alarm|MPos:0.000,0.000,0.000|")
@@ -250,10 +251,10 @@ async def test_settings_are_not_listed_in_motion() -> None:
 
 
 async def test_homing_answers_nothing_before_it_is_done() -> None:
-    async with locked() as (table, port):
+    async with locked(SLOW_HOMING) as (table, port):
         port.forget()
         port.send("$H\n")
-        await asyncio.sleep(0.1)
+        await moving(table)
         port.send("?")
         await port.heard("ok")
         assert [line[:5] for line in port.lines] == ["<Idle", "ok"]

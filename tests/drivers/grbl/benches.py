@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from drivers.axis import AxisSpec
-from drivers.clock import SystemClock
 from drivers.driver import DriverContext
 from drivers.emulators.grbl import GrblEmulator
 from drivers.grbl import GrblController
@@ -16,6 +15,7 @@ from drivers.grbl.options import GrblAxisOptions, GrblOptions
 from drivers.simulated.options import SimulationOptions
 from drivers.simulated.world import SimulatedWorld
 from tests.drivers import rigs
+from tests.drivers.clocks import PatientClock
 
 SLIDE = AxisSpec("slide", "prismatic", "mm", (0.0, 60.0), 100.0, 2000.0, 0.01)
 PAN = AxisSpec("pan", "revolute", "deg", (-40.0, 40.0), 130.0, 3000.0, 0.01)
@@ -64,7 +64,7 @@ def make(
     **options: Any,
 ) -> Table:
     """Make a table that is not plugged in yet; `changes` are settings of the emulator, which are `QUICK` otherwise."""
-    clock = SystemClock()
+    clock = PatientClock()
     simulation = SimulationOptions.model_validate(
         {"camera": rigs.camera_truth(), "joints": rigs.joint_truths()}
     )

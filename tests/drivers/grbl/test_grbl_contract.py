@@ -5,7 +5,6 @@ from typing import Any, ClassVar
 
 import pytest
 
-from drivers.clock import SystemClock
 from drivers.contract import AxisBench, AxisContract
 from tests.drivers.grbl.benches import Table, make
 
@@ -26,7 +25,9 @@ class OnTheEmulator(AxisContract):
         await self.made.emulator.close()
 
     def bench(self) -> AxisBench:
-        return AxisBench(self.made.controller, self.axis, SystemClock(), unplug=self.made.emulator.unplug)
+        return AxisBench(
+            self.made.controller, self.axis, self.made.world.clock, unplug=self.made.emulator.unplug
+        )
 
 
 class TestSlide(OnTheEmulator):

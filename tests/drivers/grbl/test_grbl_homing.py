@@ -27,7 +27,7 @@ async def test_homing_that_is_stopped_leaves_the_axes_unhomed_and_without_alarm(
         stood = table.shaft()
         state = await table.slide.read()
         assert (state.moving, state.homed, state.fault) == (False, False, None)
-        await asyncio.sleep(0.1)
+        await table.world.clock.sleep(0.1)
         assert table.shaft() == stood
         await table.slide.home()
 
@@ -68,7 +68,7 @@ async def test_homing_that_is_stopped_before_it_is_sent_does_not_begin() -> None
         await table.slide.stop()
         with pytest.raises(MotionStoppedError):
             await homing
-        await asyncio.sleep(0.1)
+        await table.world.clock.sleep(0.1)
         assert table.shaft() == before
 
 
