@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 
+from daemon import live_view
 from daemon.live_detection import LiveDetection
 from daemon.rig import Devices
 from daemon.service import Service
@@ -69,6 +70,7 @@ async def test_all_who_look_share_one_look(
         return await newest(self)
 
     monkeypatch.setattr(LiveDetection, "newest", counted)
+    monkeypatch.setattr(live_view, "PERIOD", 3600.0)  # none of them comes too late for the look
     views = [service.view.after(None, detect=True) for _ in range(4)]
     seen = await asyncio.gather(*views)
     assert len({look.picture.sequence for look in seen}) == looks == 1

@@ -62,11 +62,14 @@ async def test_a_state_is_made_once_for_all_who_follow(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(live_state, "PERIOD", 0.01)
+    monkeypatch.setattr(live_state, "SILENCE", 10**9)  # nothing is told but what has changed
     states = LiveState(service)
     followers = [aiter(states.follow()) for _ in range(3)]
-    for _ in range(3):
+    for owner in ("anna", "ben", "chris"):
+        service.leases.take_over(owner, "", 60)
         told = [await anext(follower) for follower in followers]
         assert told[0] is told[1] is told[2]
+        assert owner in told[0]
 
 
 async def test_silence_is_broken_before_anybody_takes_it_for_the_end(
