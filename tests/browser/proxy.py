@@ -16,10 +16,12 @@ def proxied(address: str) -> Iterator[str]:
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     try:
-        server = asyncio.run_coroutine_threadsafe(_serve(address), loop).result(20)
+        server = asyncio.run_coroutine_threadsafe(_serve(address), loop).result(60)
         port = server.sockets[0].getsockname()[1]
-        yield f"http://127.0.0.1:{port}{PATH.decode()}/"
-        asyncio.run_coroutine_threadsafe(_end(server), loop).result(20)
+        try:
+            yield f"http://127.0.0.1:{port}{PATH.decode()}/"
+        finally:
+            asyncio.run_coroutine_threadsafe(_end(server), loop).result(60)
     finally:
         loop.call_soon_threadsafe(loop.stop)
         thread.join()
