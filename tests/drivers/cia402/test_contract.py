@@ -16,13 +16,17 @@ class OnTheBus(AxisContract):
 
     @pytest.fixture(autouse=True)
     async def switched_on(self) -> AsyncIterator[None]:
-        self.rig = Rig(self.axis_options, self.axis_options, silence="1 s", **self.options)
+        self.rig = Rig(self.axis_options, self.axis_options, **self.options)
         await self.rig.start()
         yield
         await self.rig.emulator.close()
 
     def bench(self) -> AxisBench:
-        return AxisBench(self.rig.controller, self.axis, self.rig.clock, self.rig.emulator.unplug)
+        return AxisBench(self.rig.controller, self.axis, self.rig.clock, self.take_away)
+
+    def take_away(self) -> None:
+        """Take the bus away in a way that is noticed before a silence is."""
+        self.rig.emulator.go_off()
 
 
 class TestOverAVirtualBus(OnTheBus):
@@ -36,6 +40,9 @@ class TestOverMulticast(OnTheBus):
 
 class TestOverASerialAdapter(OnTheBus):
     options: ClassVar[dict[str, Any]] = {"interface": "slcan", "channel": "set by the emulator"}
+
+    def take_away(self) -> None:
+        self.rig.emulator.unplug()
 
 
 class TestDrivesThatNeverAcknowledge(OnTheBus):
