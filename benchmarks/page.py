@@ -120,6 +120,7 @@ def _opened(browser: Browser, address: str) -> tuple[float, float]:
 def _tab(context: BrowserContext, address: str) -> Page:
     """Return a tab that shows the live picture."""
     page = context.new_page()
+    page.set_default_timeout(60_000)  # a busy machine takes its time
     page.goto(address)
     page.locator("canvas[data-points]").first.wait_for()
     return page

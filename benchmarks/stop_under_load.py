@@ -103,7 +103,7 @@ async def _stop(connection: Connection, told: "queue.Queue[float]") -> float:
         told.get()
     asked = time.monotonic()
     await send(connection, "POST", "/api/v1/stop")
-    reached = await asyncio.to_thread(told.get, True, 5.0)
+    reached = await asyncio.to_thread(told.get, True, 60.0)
     await send(connection, "POST", "/api/v1/stop/acknowledge")
     return 1e3 * (reached - asked)
 
