@@ -1,8 +1,10 @@
 import asyncio
+import time
 
 import pytest
 
 from drivers.clock import ScaledClock, SystemClock
+from tests.drivers.clocks import PatientClock
 
 
 @pytest.mark.parametrize("clock", [SystemClock(), ScaledClock(1000)])
@@ -25,3 +27,13 @@ async def test_a_scaled_clock_runs_faster_than_life() -> None:
 def test_a_clock_that_stands_is_refused(scale: float) -> None:
     with pytest.raises(ValueError, match="scale must be positive"):
         ScaledClock(scale)
+
+
+async def test_a_patient_clock_leaves_out_what_held_the_event_loop_up() -> None:
+    clock = PatientClock()
+    before = clock.now()
+    time.sleep(0.2)  # noqa: ASYNC251  which holds it up
+    assert clock.now() - before <= 0.02
+    before = clock.now()
+    await clock.sleep(0.1)
+    assert clock.now() - before >= 0.1
