@@ -16,6 +16,7 @@ from daemon.profile import load_profile
 from daemon.rig import make_devices
 from daemon.service import Service, running_service
 from daemon.store import RunRecord, RunState
+from drivers.camera import Frame
 from drivers.driver import DriverContext
 from drivers.emulators.registry import controller_emulator
 from drivers.registry import controller_driver
@@ -82,6 +83,19 @@ class Course:
         await self.told("moving", position=2)
         await until(lambda: abs(self.shafts()[0] - FAR) < 0.01 and not self.service.rig.snapshot.moving)
 
+    async def looking(self) -> None:
+        """Wait until the run asks for a picture."""
+        rig, asked = self.service.rig, asyncio.Event()
+        frame = rig.frame
+
+        async def noted(after: float | None = None) -> Frame:
+            asked.set()
+            return await frame(after)
+
+        rig.frame = noted  # type: ignore[method-assign]
+        await asked.wait()
+        rig.frame = frame  # type: ignore[method-assign]
+
     async def stand(self) -> bool:
         """Return whether no axis moves."""
         before = self.shafts()
@@ -104,8 +118,8 @@ async def settling(course: Course) -> None:
 
 
 async def capturing(course: Course) -> None:
-    await course.at_rest()
-    await asyncio.sleep(0.2)
+    await course.told("moving", position=2)
+    await course.looking()
 
 
 async def between_joints(course: Course) -> None:
