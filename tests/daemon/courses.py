@@ -21,6 +21,7 @@ from drivers.driver import DriverContext
 from drivers.emulators.registry import controller_emulator
 from drivers.registry import controller_driver
 from tests.daemon.rigs import write_profile
+from tests.drivers.clocks import PatientClock
 from tests.drivers.grbl.benches import until
 
 PATIENCE = 60.0
@@ -174,7 +175,7 @@ async def running(
 ) -> AsyncIterator[Course]:
     """Start a run of the small rig on emulated equipment, with a simulated camera, in a folder that is there."""
     profile = load_profile(write_small_rig(folder, positions, reach))
-    devices = make_devices(profile)
+    devices = make_devices(profile, PatientClock())
     context = DriverContext(devices.clock, devices.world)
     driver, specs = controller_driver(equipment.driver), {axis.spec.name: axis.spec for axis in profile.axes}
     options = {**equipment.options, equipment.place: str(folder)}

@@ -23,7 +23,8 @@ TABLE = Equipment(
         "pan": {"letter": "Y", "machine_zero": "20 deg"},
     },
 )
-SILENT = r"has not answered for 1 s|does not come back from a reset"
+SILENT = r"has not answered for [15] s|does not come back from a reset"
+"""It has `homing_timeout` to answer while it homes, in which it is asked nothing else."""
 FAULTS: Faults = {
     "unplugged": (GrblEmulator.unplug, r"the port .* is gone"),
     "mute": (GrblEmulator.mute, SILENT),
