@@ -42,7 +42,7 @@ BELONGS = float(chi2.isf(RARE, 6))
 WORTH_TELLING = 0.02
 """The part of the misfit that an unused warp of the target must explain to be told of."""
 HINT = 4.0
-"""What a coefficient must promise where views count as scattered: that hides most of what it would gain."""
+"""What a coefficient must promise where views are scattered or set aside: that hides most of what it would gain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +95,9 @@ class Search:
     given: Array
 
     def scattered(self, fit: Fit) -> bool:
-        """Whether the fit takes for scatter what a correction may explain."""
-        return fit.problem.looseness > 0 or bool((fit.problem.reading_std != self.given).any())
+        """Whether the fit takes for scatter, or has set aside, what a correction may explain."""
+        loosened = fit.problem.looseness > 0 or bool((fit.problem.reading_std != self.given).any())
+        return loosened or bool(fit.aside.views)
 
     def forward(
         self, fit: Fit, has: Imperfections, candidate: Candidate, price: float
