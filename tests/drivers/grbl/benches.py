@@ -78,7 +78,7 @@ def make(
         restarts=restarts,
         single_axis_homing=single_axis_homing,
     )
-    keys = {"answer_timeout": "500 ms", "report_interval": "10 ms"} | options
+    keys = {"answer_timeout": "1 s", "report_interval": "10 ms"} | options
     controller = GrblController.create(
         specs,
         GrblOptions.model_validate({"port": str(emulator.port.path)} | keys),
